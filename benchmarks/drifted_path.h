@@ -20,7 +20,7 @@ inline Trajectory true_path(const SimulatedWorld& world, const std::vector<TimeN
 }
 
 // The truth as a map or an odometry would have it: in the frame of its first pose, level to 0.05
-// degrees, with errors that grow with the way.
+// degrees. Its errors grow with the way.
 inline Trajectory drifted_path(const Trajectory& truth, std::uint64_t seed) {
   Random random(seed, 7);
   const auto normal = [&](double sd) {

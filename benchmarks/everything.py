@@ -7,10 +7,11 @@
   ./run accuracy --everything --seed 41          the seed of tables of one seed (default 41; to 19: tuning)
   ./run accuracy --everything --write            lets the commands put their tables into the pages
 
-What a command prints goes to out/everything/NAME.txt (`--keep` names another folder), with version and digest of
-the program, date, seconds and exit status at its head, and a line to out/everything/done.jsonl. A command that
-is done with this program is passed over, one that failed or was stopped is run again. Many of them keep their own
-rows and go on in the middle. Exit status 1 if a command failed. Python standard library only.
+What a command prints goes to out/everything/NAME.txt (`--keep` names another folder). At its head stand
+version and digest of the program, date, seconds and exit status. A line goes to
+out/everything/done.jsonl. A command that is done with this program is passed over, one that failed or
+was stopped is run again. Many of them keep their own rows and go on in the middle. Exit status 1 if a
+command failed. Python standard library only.
 """
 
 import argparse

@@ -32,8 +32,9 @@ from program import (Failed, TOP, digest, machine, map_recording, own_cpus, run,
 
 RESULTS = TOP / "docs" / "method" / "faults.md"
 BEGIN, END = "<!-- faults table: ./run accuracy --faults --write -->", "<!-- end of faults table -->"
-# One of each carrier, with four scanners and four IMUs: a walker (OS0-128), a harvester that shakes and
-# sees 210 degrees (VLP-16), a UAV with a cheap IMU over small pines (VLP-16), a fast sleigh in snow (RS-16).
+# One of each carrier, with four scanners and four IMUs. A walker (OS0-128), and a harvester that
+# shakes and sees 210 degrees (VLP-16). A UAV with a cheap IMU over small pines (VLP-16), and a fast
+# sleigh in snow (RS-16).
 SITES = ["handheld", "harvester", "lohja1", "lake"]
 FLOOR_TIMES, FLOOR_M = 3.0, 0.05
 LAST_TUNING_SEED = 19

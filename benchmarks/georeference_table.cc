@@ -1,9 +1,9 @@
 // Many receivers on one path: how far each fit to satellite positions lays a run off its place, and
-// whether the stated covariance holds (docs/method/georeference.md; georeference_table.py).
+// whether the stated covariance holds. See docs/method/georeference.md; georeference_table.py.
 //   georeference_table SITE PATH FROM TO [--fits-only] [key=value ...]
-// PATH is a run folder that was mapped on the site with the same settings, or drift:N, the true
-// path with the drift of seed N. The receivers have the seeds FROM to TO. --fits-only leaves
-// the slow methods out: fuse, fit6 and gnss-path. Prints one row of CSV a receiver and method.
+// PATH is a run folder that was mapped on the site with the same settings. drift:N is the true path
+// with the drift of seed N. The receivers have the seeds FROM to TO. --fits-only leaves the slow
+// methods out: fuse, fit6 and gnss-path. Prints one row of CSV a receiver and method.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>

@@ -60,8 +60,8 @@ def read_fixes(path):
 
 
 def correlation_time(times, errors):
-    """Lag at which the autocorrelation of what is left of the mean falls below 1/e (mean over the
-    axes), seconds; a series that never does so lasts longer than its third can tell."""
+    """Lag at which the autocorrelation of what is left of the mean falls below 1/e (mean over the axes),
+    seconds. A series that never does so lasts longer than its third can tell."""
     left = errors - errors.mean(axis=0)
     step = float(np.median(np.diff(times)))
     grid = np.arange(times[0], times[-1], step)

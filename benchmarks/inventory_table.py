@@ -7,15 +7,14 @@ RUN is the folder of `understory inventory` or of `understory map --inventory fu
 `understory simulate`. The figures of all pairs are pooled. The program is build/understory, or the
 one that UNDERSTORY_PROGRAM names. Needs numpy.
 
-The map is laid on the truth by turning it about the vertical, from the trees alone; with --same-frame
-it stays where it is (an inventory of points.laz). A tree of the
-list and one of the truth are the same within 0.5 m, nearest first. Distances are those from the
-true path.
+The map is laid on the truth by turning it about the vertical, from the trees alone. With --same-frame it
+stays where it is (an inventory of points.laz). A tree of the list and one of the truth are the same
+within 0.5 m, nearest first. Distances are those from the true path.
 
 A truth with objects.csv tells on what the false stems stand. A truth with points.laz (`understory
-simulate --set truth.points=true`) tells how many points of RUN's map.laz are given to the right
-tree, and the tops of which trees were seen. A point is one of the truth if both have one time and
-lie within 0.5 m of each other. This needs laspy.
+simulate --set truth.points=true`) tells how many points of RUN's map.laz have the right tree. It also
+tells the tops of which trees were seen. A point is one of the truth if both have one time and lie within
+0.5 m of each other. This needs laspy.
 """
 import csv
 import gzip

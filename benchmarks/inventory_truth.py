@@ -67,8 +67,8 @@ def thinned(points):
 
 
 def true_trees_of(places, ticks, true_points):
-    """Of each point of a map (in the frame of the truth) the tree of the truth's nearest point of the
-    same time; -1 where there is none."""
+    """The true tree of each point of a map, in the frame of the truth. It is that of the truth's nearest
+    point of the same time; -1 where there is none."""
     true_places, true_ticks, true_ids = true_points
     if (np.diff(true_ticks) < 0).any():
         order = np.argsort(true_ticks, kind="stable")

@@ -81,8 +81,8 @@ class Walk {
 
   void compare() { agreement_.update(problem_); }
 
-  // Beside graduated non-convexity in full: loops that are used there and not here or the other way
-  // round, and the largest distance between the poses, metres.
+  // Beside graduated non-convexity in full: loops that are used by only one of both, and the
+  // largest distance between the poses, metres.
   void tell_of_full() const {
     const double begin = cpu_ms();
     const PoseGraphResult full = optimise_pose_graph(problem_, config_);

@@ -3,9 +3,10 @@
     methods_table.py [--sites evo1,tuusniemi1] [--methods ndt,gicp] [--seed 42] [--seconds 30] [--folder KEEP]
                                                                         ./run bench methods
 
-Each site is simulated once, and each method maps that recording. Drift is the error at the end of the path
-when both paths begin at the truth, in metres (Table 3) and as a share of the way (Table 4). `--seconds 0`
-takes whole sites. A run that is in the folder already is not made again, so that a long table can go on.
+Each site is simulated once, and each method maps that recording. Drift is the error at the end of the
+path when both paths begin at the truth. It is in metres (Table 3) and as a share of the way (Table 4).
+`--seconds 0` takes whole sites. A run that is in the folder already is not made again, so that a long
+table can go on.
 """
 
 import argparse

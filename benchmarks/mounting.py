@@ -2,11 +2,11 @@
 
     benchmarks/mounting.py [--seed 3] [--seconds 12] [--turns 24] [--ways dense stems stems_alone] [--work FOLDER]
 
-Lidar and IMU stay as they were recorded. The file of extrinsics names another body each time, whose axes point elsewhere.
-`dense` maps all points with the IMU and lists the trees of the run again, `stems` maps by stems with the IMU,
-`stems_alone` without. Prints the error of the path and of the trees against the truth, and how far both are from those of
-the body that stands upright. The program is build/understory, or the one that
-UNDERSTORY_PROGRAM names. Python's standard library only."""
+Lidar and IMU stay as they were recorded. The file of extrinsics names another body each time, whose axes
+point elsewhere. `dense` maps all points with the IMU and lists the trees of the run again, `stems` maps
+by stems with the IMU, `stems_alone` without. Prints the error of the path and of the trees against the
+truth. It also prints how far both are from those of the body that stands upright. The program is
+build/understory, or the one that UNDERSTORY_PROGRAM names. Python's standard library only."""
 
 import argparse
 import itertools

@@ -1,8 +1,8 @@
 // Many receivers on one path: whether the online georeference states its errors honestly at every
 // scan (docs/method/georeference.md; online_georeference.py).
 //   online_georeference SITE PATH FROM TO [key=value ...]
-// PATH is a run folder that was mapped on the site with the same settings, or drift:N, the true
-// path with the drift of seed N. The receivers have the seeds FROM to TO. Prints one row of CSV a
+// PATH is a run folder that was mapped on the site with the same settings. drift:N is the true path
+// with the drift of seed N. The receivers have the seeds FROM to TO. Prints one row of CSV a
 // receiver.
 #include <array>
 #include <cmath>

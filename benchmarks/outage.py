@@ -2,10 +2,11 @@
 
     benchmarks/outage.py [--seeds 3] [--silent 25 55] [--work FOLDER]
 
-Site `handheld`, a loop of 100 m with 512 columns. Maps it as recorded, without the lidar for the seconds of --silent, and
-without lidar and IMU. Prints the error of the path (SE(3)), the pieces of the map, and the trees within 15 m of the path:
-found of those with 30 returns, and false. The program is build/understory, or the one that UNDERSTORY_PROGRAM names.
-Python's standard library only."""
+Site `handheld`, a loop of 100 m with 512 columns. Maps it as recorded, without the lidar for the seconds
+of --silent, and without lidar and IMU. Prints the error of the path (SE(3)), the pieces of the map, and
+the trees within 15 m of the path. Of those with 30 returns it prints how many are found, and the false
+ones. The program is build/understory, or the one that UNDERSTORY_PROGRAM names. Python's standard
+library only."""
 
 import argparse
 import pathlib

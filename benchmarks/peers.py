@@ -6,10 +6,10 @@
   ./run bench peers --only DLIO KissICP           some of them
   ./run bench peers --write                       puts each table into docs/method/results.md when it is done
 
-From PyPI, into an environment of their own: evalio (LIO-SAM, DLIO, LOAM, KISS-ICP, GenZ-ICP, CT-ICP,
-MAD-ICP, FORM) and RKO-LIO; each in one of its own: SE3-LIO, GenZ-LIO, Pelorus, Super-LIO, Retro-SLAM. One
-after another, two threads, pinned to the same two processors. Errors
-are against the recording's truth; CPU and wall time a scan are without reading.
+From PyPI, into one common environment: evalio (LIO-SAM, DLIO, LOAM, KISS-ICP, GenZ-ICP, CT-ICP, MAD-ICP,
+FORM) and RKO-LIO. Each in one of its own: SE3-LIO, GenZ-LIO, Pelorus, Super-LIO, Retro-SLAM. One after
+another, two threads, pinned to the same two processors. Errors are against the recording's truth; CPU
+and wall time a scan are without reading.
 """
 
 import argparse

@@ -1,8 +1,9 @@
 """`./run accuracy --power-cut`: the power is cut at 200 random moments of a run, 100 by each front end.
 
-A moment is one of the system calls by which the run changes the disk: half of them drawn from all calls, half from
-the recording's time. What the disk then holds is drawn too (tests/durability/disk.py says by which rules). At every
-fifth moment the newest checkpoint is broken besides. Python standard library only.
+A moment is one of the system calls by which the run changes the disk. Half of them are drawn from all
+calls, half from the recording's time. What the disk then holds is drawn too (tests/durability/disk.py
+says by which rules). At every fifth moment the newest checkpoint is broken besides. Python standard
+library only.
 """
 
 import argparse

@@ -3,12 +3,12 @@
 
     realism.py [--data FOLDER] [--out PICTURE]
 
-Real: a pine stand by mobile laser, from an unmanned aircraft and from an aeroplane (spanner_mls_uas_als), a pine plot by terrestrial
-laser (treels), one scan of a VLP-16 in a park (evalio_botanic), scans of a VLP-16 and an OS1-128 in
-streets (drivers). Simulated: a pine stand as
-`understory map` maps it, and scans of a VLP-16. The same code judges real and simulated clouds;
-nothing of it knows the truth. Needs numpy, scipy, laspy and
-matplotlib. Only curves and figures leave the script, never the data's points."""
+Real: a pine stand by mobile laser, from an unmanned aircraft and from an aeroplane
+(spanner_mls_uas_als), and a pine plot by terrestrial laser (treels). Also one scan of a VLP-16 in a park
+(evalio_botanic), and scans of a VLP-16 and an OS1-128 in streets (drivers). Simulated: a pine stand as
+`understory map` maps it, and scans of a VLP-16. The same code judges real and simulated clouds; nothing
+of it knows the truth. Needs numpy, scipy, laspy and matplotlib. Only curves and figures leave the
+script, never the data's points."""
 import argparse
 import math
 import os
@@ -88,7 +88,7 @@ def above_ground(points, cell=1.0):
 
 def shares(points, heights):
     """Ground, stem and foliage by the shape of the neighbourhood alone (30 cm, of a cloud of one point
-    in 8 cm): a stem's points lie in an upright surface or line."""
+    in 8 cm). A stem's points lie in an upright surface or line."""
     tree = cKDTree(points)
     rng = np.random.default_rng(1)
     sample = rng.choice(len(points), min(20000, len(points)), replace=False)
@@ -147,8 +147,8 @@ def cross_sections(points, heights):
 # ---- single scans of a VLP-16 ----------------------------------------------------------------
 
 def stems_of_scan(points):
-    """Arcs of 8 to 60 cm in single rings that lie above each other in three rings or more: for each
-    stem its range, returns, rings and the spread of range about a circle, ring by ring."""
+    """Arcs of 8 to 60 cm in single rings that lie above each other in three rings or more. Each stem has
+    its range, returns, rings and the spread of range about a circle, ring by ring."""
     r = np.linalg.norm(points, axis=1)
     keep = (r > 1.5) & (r < 30)
     points, r = points[keep], r[keep]
@@ -223,8 +223,9 @@ def read_pcd(path):
 
 
 def range_noise(clouds):
-    """Spread of single ranges on smooth surfaces, by range: from the second differences of neighbours in a
-    ring, where seven in a row lie within 15 cm of a straight course. Rows of (from, to, sd, count)."""
+    """Spread of single ranges on smooth surfaces, by range. It comes from the second differences of
+    neighbours in a ring, where seven in a row lie within 15 cm of a straight course. Rows of (from, to,
+    sd, count)."""
     ranges, noises = [], []
     for cloud in clouds:
         xyz = np.stack([cloud["x"], cloud["y"], cloud["z"]], axis=1).astype(float)

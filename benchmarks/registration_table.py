@@ -1,11 +1,11 @@
-"""Scans of one stand matched without a guess: how many answers are right before the verdict, and how
-many wrong ones it trusts and right ones it refuses, by overlap and sensor.
+"""Scans of one stand matched without a guess: how many answers are right before the verdict. How many
+wrong ones it trusts and right ones it refuses, by overlap and sensor.
 
     registration_table.py [--seeds 1,2] [--scans 24] [--folder KEEP]      ./run bench registration
 
-Scans come from the simulator (pair_scans), pairs of a recording are matched with each other and with
-those of another seed, which show another place (global_pairs). Right is within 0.5 m and 2 degrees.
-The overlap is the share of the source's points within about 0.5 m of the target at the true pose.
+Scans come from the simulator (pair_scans). Pairs of a recording are matched with each other, and with
+those of another seed, which show another place (global_pairs). Right is within 0.5 m and 2 degrees. The
+overlap is the share of the source's points within about 0.5 m of the target at the true pose.
 """
 
 import argparse

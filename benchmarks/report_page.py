@@ -1,7 +1,8 @@
 """How fast report.html opens and moves in Chromium, and how large it is: report_page.py [--trees N] [RUN].
 
-Without a run it makes a stand of N trees (3,000) as a cloud and takes its inventory. Seconds are those of the main thread
-of the page, which do not depend on what else the machine does; those by the clock stand beside them."""
+Without a run it makes a stand of N trees (3,000) as a cloud and takes its inventory. Seconds are those
+of the main thread of the page, which do not depend on what else the machine does. Those by the clock
+stand beside them."""
 
 import argparse
 import os

@@ -4,10 +4,11 @@
     understory map REC -o RUN
     benchmarks/scan_covariance.py RUN TRUTH [RUN TRUTH ...]
 
-The error of a scan is that of its pose relative to the last keyframe before it, against the true relative
-pose, in the body frame. Each line gives the share of errors within one standard deviation (of states.csv.gz) of
-each degree of freedom, and all together; 68 % is right for errors of a normal distribution. Behind them stand the
-root mean square errors and the ratio of error and standard deviation. Needs numpy and scipy.
+The error of a scan is that of its pose relative to the last keyframe before it. It is measured against
+the true relative pose, in the body frame. Each line gives the share of errors within one standard
+deviation (of states.csv.gz), by degree of freedom and all together. 68 % is right for errors of a normal
+distribution. Behind them stand the root mean square errors and the ratio of error and standard
+deviation. Needs numpy and scipy.
 """
 import gzip
 import sys

@@ -1,9 +1,9 @@
 """`./run bench parts`: latency and error of poses from parts of a revolution (`scan_fraction`), on simulated recordings.
 
-Latency counts from the oldest point that went in to the moment the pose is there: the time between first and last point,
-and the mean time of the work. Error: RMS distance from the truth after the path of the scans was laid on it by yaw and
-translation. The truth has a pose and a velocity for each scan; between them it is the cubic of both.
-Python standard library only."""
+Latency counts from the oldest point that went in to the moment the pose is there. It is the time between
+first and last point, and the mean time of the work. Error: RMS distance from the truth after the path of
+the scans was laid on it by yaw and translation. The truth has a pose and a velocity for each scan;
+between them it is the cubic of both. Python standard library only."""
 
 import argparse
 import bisect

@@ -6,9 +6,9 @@
   ./run bench peers                  accuracy beside many more: benchmarks/peers.py
   ./run bench --write                puts the table into docs/method/results.md
 
-All take the same scans on the same two processors, in turn, round after round, so that whatever
-else the machine does falls on all of them; ratios are made within a round, and the median of the
-rounds is given. Accuracy is against the recording's truth (REC.truth), aligned by SE(3).
+All take the same scans on the same two processors, in turn, round after round. Whatever else the machine
+does then falls on all of them. Ratios are made within a round, and their median is given. Accuracy is
+against the recording's truth (REC.truth), aligned by SE(3).
 """
 
 import argparse

@@ -1,8 +1,8 @@
 """Recordings spoilt so that the map made of them is wrong: the ways, as changes of a list of messages.
 
-A way gets a `Walk` (messages in order, as tests/bad_input/recordings.py reads them) and a random
-source, and gives back a spoilt one. `Walk.true_time` says for each stamp of a scan when it was really
-taken; None where nothing true can be said of it (a scan of another recording).
+A way gets a `Walk` (messages in order, as tests/bad_input/recordings.py reads them) and a random source,
+and gives back a spoilt one. `Walk.true_time` says for each stamp of a scan when it was really taken.
+None: nothing true can be said of it (a scan of another recording).
 """
 
 import dataclasses

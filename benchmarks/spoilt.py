@@ -8,11 +8,12 @@
                                                 in good and in wrong runs, beside the limits
   ./run accuracy --spoilt --write               puts the table into docs/method/results.md
 
-Wrong: the error of the positions (RMS after the best rigid motion, scans taken at their true times) is
-over 10 times that of the undisturbed recording and over 20 cm. A spoilt recording that stays below does
-not count; it is listed as not spoilt enough, and the next one takes its place. Nor does a run that ends
-without a result (exit 3): there is no map that could deceive. Ways that never made a wrong map of seeds 1 and 2,
-because the program found them out and did without the IMU, are left out (`withstood` in spoil.py).
+Wrong: the error of the positions is over 10 times that of the undisturbed recording and over 20 cm. It
+is the RMS after the best rigid motion, with scans taken at their true times. A spoilt recording that
+stays below does not count; it is listed as not spoilt enough, and the next one takes its place. Nor does
+a run that ends without a result (exit 3): there is no map that could deceive. Ways that never made a
+wrong map of seeds 1 and 2 are left out (`withstood` in spoil.py). The program found them out there and
+did without the IMU.
 
 Good: a recording as it is whose map is not wrong by the same measure. One without its IMU is compared with
 the same recording with its IMU. Any other has nothing to be compared with: its error is 20 cm at most. A

@@ -5,12 +5,12 @@
     understory inventory TRUTH/points.laz --plots plots.csv -o RUN
     benchmarks/stand_table.py [--align] RUN TRUTH [RUN TRUTH ...]
 
-The first call writes circles of 15 m along a path, one every 4 m. The last one compares
-plots.csv of each RUN with what the true trees of 5 cm and more on the whole plot give, and pools all
-plots: mean error, root mean square error, and that of the error over its stated standard deviation
-(1 where the deviations are right). The frame of RUN must be that of the truth. Of a map that is made
-from a recording it is not: then the plots lie along the path of the run (--plots RUN), and --align
-lays the truth on the map by the trees. Needs numpy.
+The first call writes circles of 15 m along a path, one every 4 m. The last one compares plots.csv of
+each RUN with the true trees of 5 cm and more on the whole plot, and pools all plots. It gives mean
+error, root mean square error, and that of the error over its stated standard deviation (1 where the
+deviations are right). The frame of RUN must be that of the truth. A map that is made from a recording is
+not: the plots lie along the path of the run (--plots RUN). --align lays the truth on the map by the
+trees. Needs numpy.
 """
 import argparse
 import csv

@@ -1,5 +1,6 @@
-// Stems of single frames against the truth of the simulator: recall over range, precision, errors
-// of the centre, the foot and the radius, time a frame (docs/method/sparse.md).
+// Stems of single frames against the truth of the simulator (docs/method/sparse.md): recall over
+// range, and precision. Also errors of the centre, the foot and the radius, and the time of a
+// frame.
 //   stem_frames SITE SEED [EVERY] [key=value ...] [--traits FILE] [--repeats N]
 #include <algorithm>
 #include <cmath>

@@ -3,9 +3,9 @@
 //   stem_pairs STEMS.csv.gz TRAJECTORY.tum MODE YAW_DEG SHIFT_M STRIDE
 // MODE is certified, paper, or icp: trimmed ICP from the same wrong guess. The 130 stems of best
 // score of each view; every STRIDE-th pair. The middle of the search is wrong by up to half its
-// reach where that is less than a full turn, and nothing (no turn, no shift) else. One thread.
-// Prints one JSON object; `target_ms` is the part of the mean that prepares the target, which
-// odometry does once for several views.
+// reach where that is less than a full turn. Else it is no turn and no shift. One thread. Prints
+// one JSON object; `target_ms` is the part of the mean that prepares the target, which odometry
+// does once for several views.
 #include <fmt/format.h>
 
 #include <algorithm>

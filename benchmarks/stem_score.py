@@ -4,8 +4,8 @@
     python benchmarks/stem_score.py a.csv b.csv ... > weights.txt
 
 Each row: right (0 or 1), range, levels, radius, then the traits of a chain. The model is a logistic
-regression on the standardised traits, their squares, and their products with the first trait (how
-many sections) and with the last (how finely the stem is sampled)."""
+regression on the standardised traits, their squares, and products. Products are with the first trait
+(how many sections) and with the last (how finely the stem is sampled)."""
 import sys
 
 import numpy as np

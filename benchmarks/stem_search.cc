@@ -1,7 +1,7 @@
 // Where ICP of stems converges (P0 figure 6) and what Go-ICP's search costs (P0 table 3), on
-// made-up stands as dense as the paper's: 130 stems within 35 m, seen twice with 10 cm of noise, a
-// fifth of them missed each time, on ground that rolls by half a metre. One thread. Prints one JSON
-// object.
+// made-up stands as dense as the paper's. 130 stems within 35 m are seen twice with 10 cm of noise,
+// on ground that rolls by half a metre. A fifth of them is missed each time. One thread. Prints one
+// JSON object.
 //   stem_search convergence STANDS   shift and yaw, ICP in the plane
 //   stem_search tilt STANDS          shift and tilt, ICP in space
 //   stem_search boxes STANDS         search over yaw and the plane

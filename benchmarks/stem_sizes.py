@@ -3,10 +3,9 @@
 
     build/benchmarks/stem_sizes fit FILE ... | benchmarks/stem_sizes.py [--fit]
 
-The table gives bias, RMSE and how many errors lie within one and two standard deviations, for beams
-that are known (compensated), beams that are not, and for a cloud of which the ranges are not known,
-either. --fit searches constants with which 68 % and 95 % do so in each class of 30 stems and more.
-Needs numpy.
+The table gives bias, RMSE and how many errors lie within one and two standard deviations. Rows are beams
+that are known (compensated), beams that are not, and a cloud of which the ranges are not known, either.
+--fit searches constants with which 68 % and 95 % do so in each class of 30 stems and more. Needs numpy.
 """
 import io
 import sys

@@ -173,7 +173,7 @@ def stem_search(what, stands):
 
 def convergence_picture(found, turn, reach):
     """Share of starts from which ICP comes home, over shift and yaw or tilt, with the ellipse of P0
-    (26); ten steps of the turn are `reach` times the region's."""
+    (26). Ten steps of the turn are `reach` times the region's."""
     share, cell, left, top = found["share"], 26, 62, 16
     steps, size = len(share), 26 * len(share)
 

@@ -2,9 +2,9 @@
 // figures of docs/method/georeference.md. One thread. Prints one JSON object.
 //   tree_match FIRST_SEED STANDS TREES KIND [decoys] [sizes]
 // KIND: wild, clumped, dense or rows. Each stand is a made-up forest with 100,000 trees in the map
-// from the air: 65 % of the dominant trees, 10 % of the list false, 0.7 m of noise along each axis.
-// The map to find holds TREES dominant trees; its rough position is up to 200 m off. With `decoys`
-// it is of another forest. With `sizes` both maps have heights.
+// from the air. That has 65 % of the dominant trees, 10 % of the list false, and 0.7 m of noise
+// along each axis. The map to find holds TREES dominant trees; its rough position is up to 200 m
+// off. With `decoys` it is of another forest. With `sizes` both maps have heights.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -2,10 +2,11 @@
 
     benchmarks/walk_again.py --seed 3 --places 5 [--lidar VLP-16] [--work FOLDER]
 
-Records a short walk, maps it, and takes the best places of the layer look_again. At each of them it records the same
-trees again on a loop of 5 m in 9 s; and for comparison in the same way at that point of the first path that is nearest to
-the place's trees. A tree is mended if the second map lists it with a standard deviation of the diameter of at most 30 %.
-The program is build/understory, or the one that UNDERSTORY_PROGRAM names. Needs numpy."""
+Records a short walk, maps it, and takes the best places of the layer look_again. At each of them it
+records the same trees again on a loop of 5 m in 9 s. For comparison it does so at that point of the
+first path that is nearest to the place's trees. A tree is mended if the second map lists it with a
+standard deviation of the diameter of at most 30 %. The program is build/understory, or the one that
+UNDERSTORY_PROGRAM names. Needs numpy."""
 
 import argparse
 import csv

@@ -1,10 +1,9 @@
 // How many of the returns that are weather the filters of preprocess/ drop, and how many others.
 //   weather_points APART SCANS SITE KEY=VALUE ...   simulates the site and prints one line of
 //   counts
-// APART, SCANS: settings preprocess.weather.apart and .scans.
-// weather, of these dropped, others, of these dropped, of these by drop_isolated (which is always
-// on): returns of all scans but the first second, in which no scans before tell. The poses are the
-// true ones.
+// APART, SCANS: settings preprocess.weather.apart and .scans. Prints: weather, of these dropped,
+// others, of these dropped, of these by drop_isolated (which is always on). Returns of the first
+// second do not count: no scans before them tell. The poses are the true ones.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -67,7 +66,7 @@ void run(const WeatherFilterConfig& config, const std::string& site,
          const std::vector<std::string>& settings) {
   Simulator simulator(load_site(site, settings));
   std::vector<TruePoint> truth;
-  simulator.tell_points([&](const std::vector<TruePoint>& points) { truth = points; });
+  simulator.set_point_sink([&](const std::vector<TruePoint>& points) { truth = points; });
   WeatherFilter filter(config);
   Counts counts;
   TimeNs first = 0;

@@ -47,10 +47,11 @@ function(understory_layer name)
   endif()
 endfunction()
 
-# understory_unite(<target> <together> <source>...): makes the files parts of the target. With UNDERSTORY_UNITY
-# so many of them are compiled as one, so that the headers which they share are parsed once, and their templates
-# compiled once: a build from nothing takes half the time. Names in unnamed namespaces must differ within a
-# layer then. CMake's own unity builds write absolute paths, which ccache cannot know again in another clone.
+# understory_unite(<target> <together> <source>...): makes the files parts of the target. With
+# UNDERSTORY_UNITY so many of them are compiled as one. The headers which they share are parsed
+# once, and their templates compiled once: a build from nothing takes half the time. Names in
+# unnamed namespaces must differ within a layer then. CMake's own unity builds write absolute paths,
+# which ccache cannot know again in another clone.
 function(understory_unite target together)
   set(batch "")
   set(number 0)

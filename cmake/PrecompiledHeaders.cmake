@@ -1,5 +1,5 @@
 # The headers of the standard library and of Eigen that most files include are parsed once and not
-# 250 times: that is half of the time of a build. Every file still includes what it uses, so it
+# 250 times. That is half of the time of a build. Every file still includes what it uses, so it
 # compiles without this, too (UNDERSTORY_PRECOMPILE=OFF). Clang's presets do without: clang-tidy
 # would read the files in another way than the compiler.
 set(understory_shared_headers

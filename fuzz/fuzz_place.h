@@ -15,7 +15,7 @@ inline std::size_t read_to_end(Recording& recording) {
   return count;
 }
 
-// Breaks a reading off in the middle and goes on in another one: what comes is as many events as
+// Breaks a reading off in the middle and goes on in another one. There must be as many events as
 // without the break, whatever is damaged. `open` opens the same recording each time.
 template <typename Open>
 void expect_to_go_on(const Open& open) {

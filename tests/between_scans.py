@@ -1,5 +1,5 @@
-"""Poses between scans: `map --imu-rate` writes one for each sample of the IMU, predicted from what was known then, and
-`scan_fraction` one for each part of a scan."""
+"""Poses between scans. `map --imu-rate` writes one for each sample of the IMU, predicted from what was
+known then. `scan_fraction` writes one for each part of a scan."""
 
 import json
 import math

@@ -1,5 +1,5 @@
-"""A flight over young pines: `--profile uav` writes obstacles and the free height below them, tree tops alone position
-as well as they should, and what cannot be asked for is refused."""
+"""A flight over young pines. `--profile uav` writes obstacles and the free height below them, tree tops
+alone position well enough, and impossible requests are refused."""
 
 import json
 import shutil

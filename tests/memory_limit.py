@@ -1,5 +1,6 @@
-"""`understory map --max-memory-mb`: the limit is kept and the results are the bytes of a run without one; a limit that is
-too small is refused before anything is touched, with the least that works; a killed run goes on with its limit."""
+"""`understory map --max-memory-mb`: the limit is kept, and the results are the bytes of a run without
+one. A limit that is too small is refused before anything is touched, with the least that works. A killed
+run goes on with its limit."""
 
 import json
 import re

@@ -1,5 +1,5 @@
-"""Pages: links lead somewhere, every page is reached, commands, options and settings exist, no sentence has
-more than 25 words, and pages for users name papers by their titles."""
+"""Pages: links lead somewhere, every page is reached, and commands, options and settings exist. No
+sentence has more than 25 words, and pages for users name papers by their titles."""
 
 import os
 import re

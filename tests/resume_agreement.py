@@ -1,5 +1,6 @@
-"""A run killed at work and resumed on another number of threads gives the bytes of an undisturbed one:
-of a harvester's scans with an IMU, of sparse scans without one, and by stems alone with either."""
+"""A run killed at work and resumed on another number of threads gives the bytes of an undisturbed one.
+Runs are of a harvester's scans with an IMU, of sparse scans without one, and by stems alone with
+either."""
 
 import os
 import pathlib

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # check.sh [BASE]: what a change has to pass beside the tests: layers, names, functions, docstrings,
-# format, and clang-tidy on the .cc files that differ from BASE (default: where this branch left
-# main; on main the last commit).
+# comments and format. clang-tidy looks at the .cc files that differ from BASE (default: where this
+# branch left main; on main the last commit).
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 cd "$top"
@@ -29,6 +29,9 @@ python3 tools/check_functions_test.py || failed+=("the functions script's own te
 say "docstrings"
 python3 tools/check_docstrings.py || failed+=(docstrings)
 python3 tools/check_docstrings_test.py || failed+=("the docstrings script's own test")
+say "comments"
+python3 tools/check_comments.py || failed+=(comments)
+python3 tools/check_comments_test.py || failed+=("the comments script's own test")
 say "format"
 tools/format.sh --check || failed+=(format)
 say "clang-tidy on changed files"

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Fails where a class, struct, enum or free function of a header has no comment, and where a number
-of a table of constants (x_constants.h) does not say in brackets where it comes from.
+"""Fails where a class, struct, enum or free function of a header has no comment. It fails, too, where a
+number of a table (x_constants.h) does not say in brackets where it comes from.
 
-A comment stands on the line above or on the declaration's own line. One above the first of a group
-holds for the whole group: the declarations below it up to the next empty line. Exempt are members
-(their names say it, or their class does), operators, declarations without a body of types that
-another header defines, `describe(ConfigTable&, ...)`, which util/config/config.h explains for all,
-what lies in a namespace called detail, and headers of tests (test_*.h, *_test_support.h).
+A comment stands on the line above or on the declaration's own line. One above the first of a group holds
+for the whole group: the declarations below it up to the next empty line. Exempt are members (their names
+say it, or their class does), operators, and declarations without a body of types that another header
+defines. So are `describe(ConfigTable&, ...)`, which util/config/config.h explains for all, what lies in
+a namespace called detail, and headers of tests (test_*.h, *_test_support.h).
 
     check_docstrings.py [SOURCE_TREE]    exit 0: in order; 1: prints each finding; 2: no such tree
 """

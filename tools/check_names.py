@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 """Fails where one name of src/understory has two meanings, and no compiler or linker says a word.
 
-Two types of one name in one namespace: each may be in order by itself; but their inline functions and
+Two types of one name in one namespace: each may be in order by itself. But their inline functions and
 the templates over them are one symbol, of which the linker keeps either.
 
-A number of a table (x_constants.h) and a constant of another file of the layer: where eight files are
+A number of a table (x_constants.h) and a constant of another file of the layer. Where eight files are
 compiled together, the constant hides the number, if it comes first. Files that are APART are exempt.
 
-Two types or constants of one name in unnamed namespaces of a layer: whether their files are compiled
-together, and do not compile then, depends on how many files the layer has. APART files are exempt.
+Two types or constants of one name in unnamed namespaces of a layer. The number of the layer's files
+decides whether theirs are compiled together, and then they do not compile. APART files are exempt.
 
     check_names.py [SOURCE_TREE]     exit 0: in order; 1: prints each pair; 2: no such tree
 """

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# lock-python.sh: writes the exact versions and hashes of the Python packages that tests and benchmarks
-# compare with, one file for each list and each Python of a Debian release. Versions stay as they are
-# where they can; --upgrade takes the newest. A list of benchmarks/peers has no file for a
-# Python that its peer has no wheel for.
+# lock-python.sh: writes the exact versions and hashes of the Python packages that tests and
+# benchmarks compare with. There is one file for each list and each Python of a Debian release.
+# Versions stay as they are where they can; --upgrade takes the newest. A list of benchmarks/peers
+# has no file for a Python that its peer has no wheel for.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 cd "$top"

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# package.sh [--debian 12|13] [--march LEVEL] [--no-trial]: makes a Debian package and a tarball with all libraries
-# in out/, from the sources as they lie here, and tries both in a clean system.
+# package.sh [--debian 12|13] [--march LEVEL] [--no-trial]: makes a Debian package and a tarball
+# with all libraries in out/. It takes the sources as they lie here, and tries both in a clean
+# system.
 #   --debian    the release that they are for; another than this machine's is built in a clean system of that release
 #   --march     the instruction set: x86-64-v3 where not said, "none" for all processors of the architecture
 #   --no-trial  does not try them

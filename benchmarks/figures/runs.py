@@ -1,7 +1,7 @@
 """Runs that figures are drawn from. Each is made once in a folder; a finished run is taken as it is.
 
-A recording is simulated once for all runs that need it, and removed when they are done: recordings are large,
-and the same seed gives the same bytes again. Its truth stays."""
+A recording is simulated once for all runs that need it, and removed when they are done. Recordings are
+large, and the same seed gives the same bytes again. Its truth stays."""
 
 import json
 import re

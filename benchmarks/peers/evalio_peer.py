@@ -1,11 +1,11 @@
 """A pipeline out of the PyPI package evalio:
 `evalio_peer.py REC.mcap OUT.tum OUT.json THREADS PIPELINE [PACE]`.
 
-Scans are handed over as evalio's own loaders do: organised by ring and column, in the order of rows,
-with zeros where nothing came back, times from the start of the scan. A scan is held back until the
-IMU covers its end. With PACE, scans come no faster than PACE times the sensor's rate: the answers of
-DLIO and LIO-SAM depend on how far their helper threads have come. Parameters are their authors'
-defaults but for what CHANGES names. CPU time is that of all threads without the reading and the
+Scans are handed over as evalio's own loaders do: organised by ring and column, in the order of rows.
+Zeros stand where nothing came back, and times count from the start of the scan. A scan is held back
+until the IMU covers its end. With PACE, scans come no faster than PACE times the sensor's rate. The
+answers of DLIO and LIO-SAM depend on how far their helper threads have come. Parameters are their
+authors' defaults but for what CHANGES names. CPU time is that of all threads without the reading and the
 conversion of points.
 """
 

@@ -7,7 +7,7 @@ import recording
 def frames(path):
     """(scan, rows of time, specific force, turn rate) of each scan: time in seconds since the first event.
 
-    A scan is held back until the IMU covers its end; each sample comes with one scan alone, those before
+    A scan is held back until the IMU covers its end. Each sample comes with one scan alone, those before
     the first scan with that one.
     """
     held, samples, start = [], [], None

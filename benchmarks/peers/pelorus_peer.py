@@ -1,8 +1,9 @@
 """Pelorus: `pelorus_peer.py REC.mcap OUT.tum OUT.json THREADS`.
 
-Its authors' defaults, but for the recording's extrinsics, the least range of the simulated lidars (its own is 4 m)
-and one scan, not three, that begins the map, as the carrier may move at once. It works in threads of its own: a
-scan is handed over once the IMU covers its end, and the next one when it has answered. Its poses are the lidar's.
+Its authors' defaults, but for the recording's extrinsics and the least range of the simulated lidars
+(its own is 4 m). One scan, not three, begins the map, as the carrier may move at once. It works in
+threads of its own. A scan is handed over once the IMU covers its end, and the next one when it has
+answered. Its poses are the lidar's.
 """
 
 import os

@@ -1,8 +1,9 @@
 """Retro-SLAM: `retro_slam_peer.py REC.mcap OUT.tum OUT.json THREADS`.
 
-Lidar alone, with loops; its authors' defaults. Times of points go from 0 to 1 over a scan, as its readers give
-them; deskewing is off where a scan is over long before the next begins. It takes as many threads as it likes;
-the process is pinned to the same processors as the others. Its poses are the lidar's when all loops are closed.
+Lidar alone, with loops; its authors' defaults. Times of points go from 0 to 1 over a scan, as its
+readers give them. Deskewing is off where a scan is over long before the next begins. It takes as many
+threads as it likes; the process is pinned to the same processors as the others. Its poses are the
+lidar's when all loops are closed.
 """
 
 import sys

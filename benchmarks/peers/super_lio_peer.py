@@ -1,10 +1,11 @@
 """Super-LIO, a program of its own (GPL-3.0): `super_lio_peer.py REC.mcap OUT.tum OUT.json THREADS`.
 
-Its authors' defaults for a Mid-360, but for the recording's extrinsics and the least and largest range of the
-simulated lidars: its Python package takes the clouds of that sensor alone, by the middleware iceoryx2. It works in
-threads of its own, and a queue of two messages drops what comes too fast: it is fed at the sensors' rate, and
-once it answers, each scan waits for the answer to the one before. Its brings a libGLdispatch that ends the process where the system has OpenGL, so the system's is loaded first. Its poses
-are the IMU's. CPU time is that of all threads without the reading.
+Its authors' defaults for a Mid-360, but for the recording's extrinsics and the least and largest range
+of the simulated lidars. Its Python package takes the clouds of that sensor alone, by the middleware
+iceoryx2. It works in threads of its own, and a queue of two messages drops what comes too fast. So it is
+fed at the sensors' rate. Once it answers, each scan waits for the answer to the one before. It brings a
+libGLdispatch that ends the process where the system has OpenGL, so the system's is loaded first. Its
+poses are the IMU's. CPU time is that of all threads without the reading.
 """
 
 import ctypes as c

@@ -47,8 +47,8 @@ def read(files):
     return np.array(rows), np.array(right), np.array(best)
 
 
-# What each trait must weigh at least, with its sign: traits that go together can turn a weight around,
-# and then a strong rival would speak for a pose.
+# What each trait must weigh at least, with its sign. Traits that go together can turn a weight
+# around, and then a strong rival would speak for a pose.
 LEAST = np.array([0.0, 1.0, -0.3, 1.0, 0.3, 2.0])
 
 

@@ -1,8 +1,8 @@
 // What a local map of points takes that are all farther than epsilon from each other (P3, section
-// 3.3), and whether the time of a scan grows with it: local_map [MILLIONS] [EPSILON_M]. The map is
-// a stand made by hand (ground, stems, crowns; no lidar) and grows from its middle outwards.
-// Prints, as it grows, the resident memory, the time in which a keyframe in the middle enters, and
-// that of a search there.
+// 3.3). Whether the time of a scan grows with it: local_map [MILLIONS] [EPSILON_M]. The map is a
+// stand made by hand (ground, stems, crowns; no lidar) and grows from its middle outwards. Prints,
+// as it grows, the resident memory, the time in which a keyframe in the middle enters, and that of
+// a search there.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>

@@ -1,7 +1,7 @@
 // Scans of a simulated site for benchmarks of registration, without the motion within a scan:
 //   pair_scans SITE SEED COUNT FOLDER [key=value ...]
-// writes COUNT scans, evenly spread over the recording, as FOLDER/scan_N.bin (x y z intensity) and
-// their poses, world from lidar, as FOLDER/poses.txt (12 numbers a line, row by row).
+// writes COUNT scans, evenly spread over the recording, as FOLDER/scan_N.bin (x y z intensity).
+// Their poses, world from lidar, go to FOLDER/poses.txt (12 numbers a line, row by row).
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

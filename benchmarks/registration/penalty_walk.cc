@@ -1,4 +1,4 @@
-// The mapper of P3 section 3.3 on a simulated site, without an IMU factor and without a graph: each
+// The mapper of P3 section 3.3 on a simulated site, without an IMU factor and without a graph. Each
 // scan is moved by the prior's increment, matched with penalties (6-8), and enters the map point by
 // point.
 //   penalty_walk SEED WAY_M SCALE PRIOR_SD_DEG [key=value ...]
@@ -7,7 +7,7 @@
 // root metre. One line of CSV a scan and kind:
 //   penalties,way_m,height_m,pitch_deg,true_height_m,true_pitch_deg,matched
 // Positions of the penalties are the true ones with 3 cm of white noise, attitudes (gravity and
-// heading) with 0.3 degrees; the motion within a scan is taken out by the true poses. Heights are
+// heading) with 0.3 degrees. The motion within a scan is taken out by the true poses. Heights are
 // above the start.
 #include <cmath>
 #include <cstdio>

@@ -3,8 +3,9 @@
 //   verdict_pairs FOLDER_A FOLDER_B METHOD STARTS [MOST_OFF_M [MOST_OFF_DEG [MOST_APART_M [SEED]]]]
 // Folders as pair_scans writes them. Of one folder (A = B) each scan meets the later ones that are
 // not farther apart. Of two, each scan meets all of the other place, and no answer is right. METHOD
-// `global` begins at no guess, any other one STARTS times a pair at a guess that is off at random:
-// a shift in the plane up to MOST_OFF_M, a fifth of it in height, a turn about up to MOST_OFF_DEG.
+// `global` begins at no guess. Any other one begins STARTS times a pair at a guess that is off at
+// random. It is off by a shift in the plane up to MOST_OFF_M, and a fifth of it in height. The
+// guess is turned by up to MOST_OFF_DEG.
 #include <cmath>
 #include <cstdint>
 #include <cstdio>

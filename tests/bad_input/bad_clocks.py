@@ -1,5 +1,5 @@
-"""Sensors whose clocks run apart, that begin late or die, through `understory map` by both front ends:
-offsets are mended and said, and whoever comes late is used from then on."""
+"""Sensors whose clocks run apart, that begin late or die, through `understory map` by both front ends.
+Offsets are mended and reported, and a late sensor is used from then on."""
 
 import contextlib
 import dataclasses

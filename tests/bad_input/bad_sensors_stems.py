@@ -1,5 +1,5 @@
-"""Sensors that fail, through `understory map --front-end sparse`: an IMU that is wrong is found out by
-the stems, and the recording mapped as if it had none; scans that are smeared are said to be."""
+"""Sensors that fail, through `understory map --front-end sparse`. The stems find out a wrong IMU, and
+the recording is mapped as if it had none. Smeared scans are reported."""
 
 import json
 import math

@@ -1,5 +1,6 @@
-"""Commands that are broken off in the middle, killed, stopped or out of room: what was there before stays, what
-is half made is not seen, and the same command works afterwards. A run at work is left alone by all others."""
+"""Commands that are broken off in the middle, killed, stopped or out of room. What was there before
+stays, nothing half made is seen, and the same command works afterwards. A run at work is left alone by
+all others."""
 
 import gzip
 import os

@@ -1,5 +1,6 @@
-"""A disk that becomes full at any point, in the commands that write a folder from other results: the exit code is 3 and
-the message names the place, nothing is left behind, former results stay as they are, and with room it is done."""
+"""A disk that becomes full at any point, in the commands that write a folder from other results. The
+exit code is 3, the message names the place, and nothing is left behind. Former results stay as they are,
+and with room the command works."""
 
 import resource
 import shutil

@@ -1,7 +1,7 @@
-"""Recordings that begin within a turn of the lidar: a capture, and clouds whose first one is a part,
-with and without times of their points; the sensor stands still or is carried. Bug: the first two
-scans were 25 ms apart, a small error between them became a great speed, and a sensor that stood
-still was lost within half a second."""
+"""Recordings that begin within a turn of the lidar: a capture, and clouds whose first one is a part.
+Points have times or none, and the sensor stands still or is carried. Bug: the first two scans were 25 ms
+apart, and a small error between them became a great speed. A sensor that stood still was lost within
+half a second."""
 
 import dataclasses
 import struct

@@ -1,5 +1,6 @@
-"""Recordings as lists of messages that a test can spoil, and writers for the formats that are read:
-MCAP, ROS 1 bag, ROS 2 bag (.db3) and a capture of Velodyne packets. The standard library only."""
+"""Recordings as lists of messages that a test can spoil, with writers for the formats that are read.
+They are MCAP, ROS 1 bag, ROS 2 bag (.db3) and a capture of Velodyne packets. The standard library
+only."""
 
 import dataclasses
 import math

@@ -1,5 +1,5 @@
-"""Ctrl-C and SIGTERM at many moments, in every command that takes long: it ends soon, with exit code 4, leaves
-nothing half written, and former results stay. What `map` had positioned is gone on with."""
+"""Ctrl-C and SIGTERM at many moments, in every command that takes long. It ends soon, with exit code 4,
+leaves nothing half written, and former results stay. What `map` had positioned is gone on with."""
 
 import shutil
 import signal

@@ -1,5 +1,5 @@
-"""Clouds and tree lists in a frame or unit that is not theirs, through `understory inventory`, `merge` and
-`evaluate trees`: a list that is wrong is never called complete."""
+"""Clouds and tree lists in a wrong frame or unit, through `understory inventory`, `merge` and `evaluate
+trees`. A list that is wrong is never called complete."""
 
 import csv
 import json

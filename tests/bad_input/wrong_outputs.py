@@ -1,5 +1,5 @@
-"""Ways to name an output wrongly, for every command that writes: files and folders of others stay as they
-are, to the byte and the time of change, and nothing is left beside them."""
+"""Ways to name an output wrongly, for every command that writes. Files and folders of others keep their
+bytes and their time of change, and nothing is left beside them."""
 
 import fcntl
 import gzip

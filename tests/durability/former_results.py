@@ -1,5 +1,5 @@
-"""A power cut while a run puts its results in the place of a former run's: what the former run made and this one
-does not make is never lost, and its run.json stays with it."""
+"""A power cut while a run puts its results in the place of a former run's. What the former run made and
+this one does not is never lost, and its run.json stays with it."""
 
 import os
 import pathlib

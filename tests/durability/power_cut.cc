@@ -1,11 +1,11 @@
-// A library to preload into a program: it writes down every system call by which the program
-// changes files below one folder, with the bytes, so that tests/durability/disk.py can tell what a
-// disk may hold after a power cut at any moment.
+// A library to preload into a program. It writes down every system call by which the program
+// changes files below one folder, with the bytes. tests/durability/disk.py then tells what a disk
+// may hold after a power cut at any moment.
 //
-// It does not replace functions of the C library: stdio, the C++ streams, GDAL and SQLite call the
+// It does not replace functions of the C library. stdio, the C++ streams, GDAL and SQLite call the
 // kernel from inside of libraries, past any function of the same name. Instead a seccomp filter
-// makes the kernel stop at these system calls, whoever makes them, and hand them to a signal
-// handler here, which makes the call itself and notes what came of it.
+// makes the kernel stop at these system calls, whoever makes them. A signal handler here gets them,
+// makes each call itself and notes what came of it.
 //
 // UNDERSTORY_POWER_CUT_FOLDER   what lies below is watched (absolute, without symbolic links)
 // UNDERSTORY_POWER_CUT_LOG      the log, begun anew

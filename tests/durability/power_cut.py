@@ -1,5 +1,6 @@
-"""A power cut at chosen moments of a run, by either front end: the run is never lost, what is processed again is
-bounded, and the results have the bytes of an undisturbed run. `./run accuracy --power-cut` draws 200 moments."""
+"""A power cut at chosen moments of a run, by either front end. The run is never lost, little is
+processed again, and the results have the bytes of an undisturbed run. `./run accuracy --power-cut` draws
+200 moments."""
 
 import os
 import pathlib

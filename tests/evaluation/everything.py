@@ -1,5 +1,6 @@
-"""The driver of all tables (benchmarks/everything.py): what a command prints is kept with version and exit status, a
-command that is done is passed over, one that failed and one of another program is run again."""
+"""The driver of all tables (benchmarks/everything.py). What a command prints is kept with version and
+exit status, and a command that is done is passed over. One that failed, or that another program ran, is
+run again."""
 
 import sys
 import tempfile

@@ -1,5 +1,6 @@
-"""The table of faults (benchmarks/faults.py): a wrong run that is called complete or whose reason names something
-else misses the floor; rows of another program do not count; settings that a fault names are those of sites."""
+"""The table of faults (benchmarks/faults.py). A wrong run that is called complete, or whose reason names
+something else, misses the floor. Rows of another program do not count, and settings that a fault names
+are those of sites."""
 
 import os
 import subprocess

@@ -1,5 +1,6 @@
-"""`./run accuracy --figures` (benchmarks/paper_figures.py): figures of tiny runs are drawn, with values that are those of
-the runs; a second call makes no run again; what is asked for wrongly is refused; and the geometry behind the figures."""
+"""`./run accuracy --figures` (benchmarks/paper_figures.py) on tiny runs. Figures hold the values of the
+runs, a second call makes no run again, and wrong requests are refused. The geometry behind the figures
+is tested, too."""
 
 import contextlib
 import csv

@@ -1,6 +1,6 @@
-"""Paths have the right size: what a lidar sees of stems and crowns is their near side, which goes along
-with it, and flakes go along altogether; both would make paths too short (docs/method/registration.md). Each is
-switched off once, through the whole program, so that its share shows."""
+"""Paths have the right size. What a lidar sees of stems and crowns is their near side, which goes along
+with it, and flakes go along altogether. Both would make paths too short (docs/method/registration.md).
+Each is switched off once, through the whole program, so that its share shows."""
 
 import json
 import os

@@ -1,5 +1,5 @@
-"""The record of the peers' tables (benchmarks/peers.py): a table that is measured again replaces its
-like, all others stay, and the summary names the best of the others, failed ones left out."""
+"""The record of the peers' tables (benchmarks/peers.py). A table that is measured again replaces its
+like, and all others stay. The summary names the best of the others, without those that failed."""
 
 import sys
 import tempfile

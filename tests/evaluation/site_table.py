@@ -1,4 +1,4 @@
-"""The table of all sites (benchmarks/sites.py): rows that are measured again replace their like, all
+"""The table of all sites (benchmarks/sites.py). Rows that are measured again replace their like, all
 others stay, and a row comes out of the program's own figures."""
 
 import sys

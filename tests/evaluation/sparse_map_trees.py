@@ -1,5 +1,5 @@
-"""A harvester's 16 rings that mostly stand still: every scan of a swing adds to the map, and the trees near the
-way are found in it."""
+"""A harvester's 16 rings that mostly stand still. Every scan of a swing adds to the map, and the trees
+near the way are found in it."""
 
 import json
 import os

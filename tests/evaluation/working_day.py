@@ -1,5 +1,5 @@
-"""A working day (benchmarks/day.py) on a short run of the program: the row holds the run's own figures, memory that grows
-and scans that take ever longer are told, and a run that was killed goes on."""
+"""A working day (benchmarks/day.py) on a short run of the program. The row holds the run's own figures,
+and tells memory that grows and scans that take ever longer. A run that was killed goes on."""
 
 import json
 import os

@@ -1,5 +1,6 @@
-"""`understory georeference --method auto` with fixes, a map of trees and a terrain model: each degree of
-freedom by what knows it, an honest error, and what it says to sources that contradict each other.
+"""`understory georeference --method auto` with fixes, a map of trees and a terrain model. Each degree of
+freedom comes from the source that knows it, with an honest error. Sources that contradict each other are
+named.
 
     all_together.py FIRST LAST     a table instead: errors of stands and receivers of these seeds
 """

@@ -1,5 +1,5 @@
-"""`understory georeference --method trees`: a run found again in a map of trees by its trees alone, from
-CSV and GeoPackage, with and without a coordinate system, and what it says to maps that will not do."""
+"""`understory georeference --method trees`: a run is found again in a map of trees by its trees alone.
+Maps are CSV and GeoPackage, with and without a coordinate system, and some that will not do."""
 
 import csv
 import json

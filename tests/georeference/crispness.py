@@ -1,6 +1,6 @@
-"""A map stays crisp when bad positions by satellites enter its graph: bursts and jumps on, its cloud has the entropy of
-the cloud without them, and its path the error. What is called its entropy is the one of the definition, and tells a
-blurred cloud from a crisp one."""
+"""A map stays crisp when bad positions by satellites enter its graph. With bursts and jumps its cloud
+has the entropy of the cloud without them, and its path the error. What is called its entropy is the one
+of the definition, and tells a blurred cloud from a crisp one."""
 
 import json
 import math

@@ -1,5 +1,5 @@
-"""`understory georeference`: a run laid on a GNSS path whose receiver runs away, levelled to a terrain
-model in a national grid, and what it says to input that will not do."""
+"""`understory georeference`: a run is laid on a GNSS path whose receiver runs away, and levelled to a
+terrain model in a national grid. Input that will not do is refused."""
 
 import csv
 import json

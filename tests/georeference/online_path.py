@@ -1,5 +1,5 @@
-"""global.csv.gz of `map`: at every scan the place and heading on the globe with honest standard deviations, by nothing
-but what was received until then; with --realtime, too."""
+"""global.csv.gz of `map`: at every scan the place and heading on the globe, with honest standard
+deviations. Nothing but what was received until then counts; with --realtime, too."""
 
 import csv
 import gzip

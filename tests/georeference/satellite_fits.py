@@ -1,5 +1,5 @@
-"""`understory georeference` by the times of satellite positions and by control points: every method
-lays a run where it belongs within what it promises, and says what is wrong with bad input."""
+"""`understory georeference` by the times of satellite positions and by control points. Every method lays
+a run where it belongs within its stated error, and names what is wrong with bad input."""
 
 import csv
 import json

@@ -1,5 +1,6 @@
-"""Headings of a second antenna, by its sentences and by its positions: they lay the map within what is stated, place a
-machine that stands, and are noticed where they contradict the positions or are those of another line."""
+"""Headings of a second antenna, by its sentences and by its positions. They lay the map within the
+stated error and place a machine that stands. Headings that contradict the positions, or are those of
+another line, are noticed."""
 
 import csv
 import json

@@ -1,8 +1,9 @@
 """map.copc.laz agrees with map.laz, as the Python packages laspy and copclib read them.
 
-A simulated walk is mapped with `--copc`, its inventory is taken with `--copc`, and the run is laid on the globe. Every
-COPC holds the points of the LAZ beside it, each once, in the cube of its node; queries by place and level find what a
-search through all points finds. The same bytes for any number of threads: same_bytes.py.
+A simulated walk is mapped with `--copc`, its inventory is taken with `--copc`, and the run is laid on
+the globe. Every COPC holds the points of the LAZ beside it, each once, in the cube of its node. Queries
+by place and level find what a search through all points finds. The same bytes for any number of threads:
+same_bytes.py.
 """
 
 import json

@@ -1,8 +1,8 @@
 """A full inventory through the program: stem curves, volumes, crowns, and the tree of each point.
 
-A simulated walk is mapped with `--inventory full`; the map is then taken stock of once more, as a
-run and as a cloud of its own. What is written is compared with the truth of the simulation, and
-read by laspy and GDAL's SQLite.
+A simulated walk is mapped with `--inventory full`. The inventory of the map is then made once more, as
+of a run and as of a cloud. What is written is compared with the truth of the simulation, and read by
+laspy and GDAL's SQLite.
 """
 
 import csv

@@ -1,5 +1,5 @@
-"""`understory inventory` of a cloud in tiles on disk: the same trees as of the cloud in one piece, whatever the
-tiles and threads are; no room in memory or on the disk; nothing is left behind."""
+"""`understory inventory` of a cloud in tiles on disk. It finds the trees of the cloud in one piece,
+whatever the tiles and threads are. Without room in memory or on the disk nothing is left behind."""
 
 import resource
 import signal

@@ -1,7 +1,7 @@
 """LAZ files agree with the Python package laspy, both ways.
 
-What the program writes (the map of a run, the clouds of a converted recording) is read by laspy;
-what laspy writes (several point formats, scales and a coordinate system) is read by the program.
+What the program writes (the map of a run, the clouds of a converted recording) is read by laspy. What
+laspy writes (several point formats, scales and a coordinate system) is read by the program.
 """
 
 import csv

@@ -1,6 +1,6 @@
-"""`output.world_frame=ned` of `map`: the same recording in both axes. Turned by the matrix of the pages, each file is
-that of the run in east, north, up, clouds and layers have the same bytes, and every command that reads a run says the
-same of both. By stems, too."""
+"""`output.world_frame=ned` of `map`: the same recording in both axes. Turned by the matrix of the pages,
+each file is that of the run in east, north, up. Clouds and layers have the same bytes, and every command
+that reads a run says the same of both. By stems, too."""
 
 import csv
 import gzip

@@ -1,5 +1,6 @@
-"""The installed program runs from wherever its tree is moved to: it finds its profiles, sites and coordinate systems,
-names no folder that it was built in or linked from, and says the version of CMakeLists.txt and CHANGELOG.md."""
+"""The installed program runs from wherever its tree is moved to. It finds its profiles, sites and
+coordinate systems, and names no folder that it was built in or linked from. It says the version of
+CMakeLists.txt and CHANGELOG.md."""
 
 import json
 import os

@@ -1,5 +1,6 @@
-"""packaging/copyright names every library that is compiled into the program: archives that are linked in, and packages
-whose headers are used and whose shared library is not loaded. Asks ninja what the program is made of."""
+"""packaging/copyright names every library that is compiled into the program. Those are archives that are
+linked in, and packages whose headers are used without a shared library. Asks ninja what the program is
+made of."""
 
 import os
 import re

@@ -1,9 +1,9 @@
 """`understory inventory` on two real clouds: exactly the stems that the eye finds.
 
-Pines scanned by a mobile scanner, and a plantation by a terrestrial one whose whorls of branches
-must not become stems. The lists began as the program's own; each place was looked at in cross
-sections 0.9 to 1.9 m above the ground and from the side, and found to be a stem, and no other ring
-was found there. Three things hold them that are not the program's list:
+Pines scanned by a mobile scanner, and a plantation by a terrestrial one whose whorls of branches must
+not become stems. The lists began as the program's own. Each place was looked at in cross sections 0.9 to
+1.9 m above the ground and from the side. All were stems, and no other ring was found there. Three things
+hold them that are not the program's list:
 - the plantation's stems are the columns that a count of points finds, without circles or cones;
 - both halves of the mobile cloud, every other point each, give the same places and diameters;
 - a cloud of the same stand that was flown, by another sensor, gives the same diameters.

@@ -1,10 +1,10 @@
 """`understory map` on the two short real recordings, scan to scan.
 
-OS-1-128 capture with IMU packets: relative poses in Ouster's sensor frame against those that come
-with the capture (a scan matcher's answer, so a peer's, not truth): 3 cm and 0.2 degrees.
-Four KITTI scans, already deskewed, without IMU: against small_gicp's GICP (voxels of 0.25 m) in the
-same run, 3 cm and 0.1 degrees; the difference from KITTI's own poses is reported. Both begin without a
-motion and guess the next one from their own last one: neither knows the other's answer.
+OS-1-128 capture with IMU packets: relative poses in Ouster's sensor frame agree with those of the
+capture to 3 cm and 0.2 degrees. Those are a scan matcher's answer, so a peer's, not truth. Four KITTI
+scans, already deskewed, without IMU, agree with small_gicp's GICP (voxels of 0.25 m) in the same run to
+3 cm and 0.1 degrees. The difference from KITTI's own poses is reported. Both begin without a motion and
+guess the next one from their own last one: neither knows the other's answer.
 """
 
 import json

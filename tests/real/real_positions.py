@@ -1,5 +1,5 @@
-"""Post-processed positions as RTKLIB's own program writes them: a pair of real RINEX files (30 s, near
-Tokyo, 2005), differenced against each other, in four forms of the .pos file. All four are read alike,
+"""Post-processed positions as RTKLIB's own program writes them, in four forms of the .pos file. A pair
+of real RINEX files (30 s, near Tokyo, 2005) is differenced against each other. All four are read alike,
 and the time is UTC."""
 
 import calendar

@@ -1,6 +1,7 @@
-"""E57 files that the Python package pye57 writes are read by the program: the trees of a plot are the same from E57 as
-from PLY. One scan has double precision and a pose, the other one scaled integers of 20 bits and points that are
-marked as invalid. A third one, by pye57's own defaults, has single precision: its trees are nearly the same."""
+"""The program reads E57 files that the Python package pye57 writes. The trees of a plot are the same
+from E57 as from PLY. One scan has double precision and a pose, the other one scaled integers of 20 bits
+and points that are marked as invalid. A third one, by pye57's own defaults, has single precision: its
+trees are nearly the same."""
 
 import csv
 import os

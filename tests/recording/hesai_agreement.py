@@ -1,10 +1,10 @@
-"""Packets of a PandarXT-32 in a ROS 2 bag (PandarScan) against the cloud that the nebula driver made
-of them, and against the package hydra4 where it is installed.
+"""Packets of a PandarXT-32 in a ROS 2 bag (PandarScan) against the cloud that the nebula driver made of
+them. Where the package hydra4 is installed, against that, too.
 
-Every return of nebula's scan is among ours: same channel, same range and same azimuth of the block,
-and the same place to the rounding of its numbers. nebula cuts a scan by the corrected azimuth of each
-channel, this project by that of the block: the few returns between lie in the scan before or behind.
-hydra4 reads the first return of a pair alone, and places it in the same way.
+Every return of nebula's scan is among ours. Channel, range and azimuth of the block are the same, and so
+is the place to the rounding of its numbers. nebula cuts a scan by the corrected azimuth of each channel,
+this project by that of the block. The few returns between lie in the scan before or behind. hydra4 reads
+the first return of a pair alone, and places it in the same way.
 """
 
 import collections

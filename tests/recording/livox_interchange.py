@@ -1,6 +1,6 @@
-"""Livox CustomMsg as the Python package rosbags writes it, of both drivers, in a ROS 1 bag, a ROS 2 bag
-and an MCAP: every point is read here with its own time, line and reflectivity. What the simulator
-writes of a Mid-360 is read by rosbags."""
+"""Livox CustomMsg of both drivers as the Python package rosbags writes it, in a ROS 1 bag, a ROS 2 bag
+and an MCAP. Every point is read here with its own time, line and reflectivity. What the simulator writes
+of a Mid-360 is read by rosbags."""
 
 import os
 import pathlib

@@ -1,10 +1,9 @@
 """VLP-16 packets in a ROS 2 bag against the cloud that the nebula driver made of them.
 
 The same returns: ring, range and intensity of each are equal. Azimuths agree to the format's 0.01
-degrees, except where that driver does not interpolate them: for the last pair of blocks of each
-packet it repeats the blocks' azimuth, and for returns of the second block of a dual-return pair it
-takes the difference to a block at the same azimuth. There it is up to one and a half blocks of turn (0.6
-degrees) off.
+degrees, except where that driver does not interpolate them. For the last pair of blocks of each packet
+it repeats the blocks' azimuth. For the second block of a dual-return pair it takes the difference to a
+block at the same azimuth. There it is up to one and a half blocks of turn (0.6 degrees) off.
 """
 
 import collections

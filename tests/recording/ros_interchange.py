@@ -1,6 +1,6 @@
 """Recordings go both ways between this project and the Python packages mcap, mcap-ros2-support and
-rosbags: what they write (MCAP, ROS 1 and ROS 2 bags, every compression) is read here value for
-value, and what is written here is read there."""
+rosbags. What they write (MCAP, ROS 1 and ROS 2 bags, every compression) is read here value for value.
+They read what is written here."""
 
 import os
 import pathlib

@@ -24,7 +24,7 @@ theirs = theirs[np.lexsort((theirs[:, 4], np.round(theirs[:, 5] * 1e6)))]
 check(np.array_equal(ours[:, 3:5], theirs[:, 3:5]), "intensities or rings differ")
 distance = np.linalg.norm(ours[:, :3] - theirs[:, :3], axis=1)
 span = np.linalg.norm(theirs[:, :2], axis=1)
-# An azimuth is given to 0.01 degrees; theirs is rounded to that between the blocks as well, and the
+# An azimuth is given to 0.01 degrees, and theirs is rounded to that between the blocks as well. The
 # rate of turn behind a packet's last block is a guess from the blocks before it.
 limit = np.radians(0.03) * span + 1e-4
 check((distance < limit).all(), f"largest difference {distance.max()} m")

@@ -1,9 +1,9 @@
-"""Captures of a VLP-16 in dual return, an HDL-32E and a VLP-32C with random returns (packets.py), against
-velodyne_decoder: the same returns, rings and intensities, at the same times, in the same places to 0.01 degrees.
+"""Captures of a VLP-16 in dual return, an HDL-32E and a VLP-32C with random returns (packets.py),
+against velodyne_decoder. Returns, rings, intensities and times are the same, and places to 0.01 degrees.
 
-The manuals of HDL-32E and VLP-32C give no height at which a beam leaves the optics. velodyne_decoder lets all beams cross in
-one point, as those of a VLP-16 do: its points lie higher by that point's distance from the axis times the slope of the beam,
-20 mm at most. This is taken out here."""
+The manuals of HDL-32E and VLP-32C give no height at which a beam leaves the optics. velodyne_decoder
+lets all beams cross in one point, as those of a VLP-16 do. Its points lie higher by that point's
+distance from the axis times the slope of the beam, 20 mm at most. This is taken out here."""
 
 import pathlib
 import tempfile

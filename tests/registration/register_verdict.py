@@ -1,5 +1,5 @@
-"""`understory register` ends with exit code 0 only where its answer is right: clouds of one stand are
-matched without a guess, also far from the origin; clouds of other places and odd ones are refused."""
+"""`understory register` ends with exit code 0 only where its answer is right. Clouds of one stand are
+matched without a guess, also far from the origin. Clouds of other places and odd ones are refused."""
 
 import json
 import math

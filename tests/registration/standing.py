@@ -1,8 +1,9 @@
 """A carrier that stands for a minute adds no rings to the map (P3, section 5.2: "circular artifacts" of its prior maps).
 
-A sleigh drives, stands for a minute and drives on. Of the points of the map, the share that lies more than 5 cm off all
-true points must be no higher for those measured while it stood than for the others. True points have the lidar's noise,
-too, so that the distance to the nearest one is what the path adds.
+A sleigh drives, stands for a minute and drives on. The figure is the share of the map's points that lie
+more than 5 cm off all true points. Points measured while it stood must have no higher share than the
+others. True points have the lidar's noise, too, so that the distance to the nearest one is what the path
+adds.
 """
 
 import csv

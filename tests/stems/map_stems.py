@@ -1,5 +1,6 @@
 """`understory map --front-end sparse` from end to end: a harvester's scans of 16 rings against their
-truth, single views against what each scan really got of each stem, threads, captures, wrong use."""
+truth. Also single views against what each scan really got of each stem, threads, captures and wrong
+use."""
 
 import csv
 import gzip
@@ -241,8 +242,8 @@ def rows_of(path):
 
 @cases.case("a walk with an IMU and without")
 def with_imu(folder):
-    """Quick turns within scans of 128 rings, without a pause between them: the gyroscope knows them,
-    steps from scan to scan guess them, and what is taken out wrongly must not grow."""
+    """Quick turns within scans of 128 rings, without a pause between them. The gyroscope knows them, and
+    steps from scan to scan guess them. An error of the guess must not grow."""
     errors = []
     for use in ("false", "true"):
         done = sparse("sim:handheld?seed=5&duration_s=9", folder / use, "--set", f"stems.imu.use={use}")

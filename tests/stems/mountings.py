@@ -1,5 +1,5 @@
-"""A body whose axes point anywhere (benchmarks/mounting.py): path and trees are as good as those of an upright one, with
-all points and by stems, with an IMU and without; and the report says how up is known."""
+"""A body whose axes point anywhere (benchmarks/mounting.py). Path and trees are as good as those of an
+upright one, with all points and by stems, with an IMU and without. The report says how up is known."""
 
 import sys
 import tempfile

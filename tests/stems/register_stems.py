@@ -1,5 +1,5 @@
-"""`understory register` of sparse clouds: stems by trimmed ICP and by branch and bound, from a good
-guess, from a wrong one and without any, and clouds that are not sparse."""
+"""`understory register` of sparse clouds: stems by trimmed ICP and by branch and bound. The guess is
+good, wrong or absent, and some clouds are not sparse."""
 
 import json
 import math

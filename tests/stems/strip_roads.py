@@ -1,10 +1,10 @@
 """A harvester's strip roads through a made-up stand, seen as stems: stems.csv.gz and the truth.
 
 Three roads of 180 m lie 22.5 m apart and are driven there, back and there again, as the site of
-Nevalainen et al. 2020 was; the cabin swings, so a view of 210 degrees looks everywhere in turn.
-What a detector gets wrong is in it: noise that grows with the range, centres drawn to the scanner,
-feet that look higher the farther away they are, stems missed or hidden behind others, bushes that
-look like stems, and false stems. Every number hangs on the seed alone. Standard library only.
+Nevalainen et al. 2020 was; the cabin swings, so a view of 210 degrees looks everywhere in turn. It holds
+what a detector gets wrong: noise that grows with the range, centres drawn to the scanner, and feet that
+look higher with distance. It also misses stems, hides them behind others, and adds bushes and false
+stems. Every number hangs on the seed alone. Standard library only.
 """
 
 import gzip

@@ -1,5 +1,5 @@
-"""A run that is not to be trusted stays so through every command that goes on from it, and a cloud
-that cannot be a stand in metres with z up is refused: by status, reasons, report and exit code."""
+"""A run that is not to be trusted stays so through every command that goes on from it. A cloud that
+cannot be a stand in metres with z up is refused. Status, reasons, report and exit code say so."""
 
 import csv
 import gzip

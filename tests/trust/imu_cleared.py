@@ -1,5 +1,6 @@
-"""An IMU that is right and that the matches contradict: the recording is mapped with scans alone until that is clear, and
-then again from its beginning with the IMU. A path that is not the accelerometer's is not called complete."""
+"""An IMU that is right and that the matches contradict. The recording is mapped with scans alone until
+that is clear, and then again from its beginning with the IMU. A path that is not the accelerometer's is
+not called complete."""
 
 import json
 import subprocess

@@ -1,5 +1,6 @@
-"""Every run checks the IMU's clock against the scans: 20 ms put into the stamps are told, with their size and sign, and a
-good clock is not spoken of. The run is the same either way, also after it was cut off."""
+"""Every run checks the IMU's clock against the scans. 20 ms put into the stamps are told, with their
+size and sign, and a good clock is not spoken of. The run is the same either way, also after it was cut
+off."""
 
 import json
 import signal

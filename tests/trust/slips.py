@@ -1,6 +1,6 @@
-"""What a new user gets wrong is named, with what to do about it: commands that are not there, clouds for
-recordings, sensors tens of metres apart, rates in degrees; paths that do not determine a figure; progress
-that fits the terminal."""
+"""Mistakes of a new user are named, with what to do about them. There are commands that do not exist,
+clouds for recordings, sensors tens of metres apart, and rates in degrees. Also paths that do not
+determine a figure, and progress that fits the terminal."""
 
 import json
 import math

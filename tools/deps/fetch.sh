@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # fetch.sh FOLDER PACKAGE...: the upstream tarballs of Debian source packages from a newer release
-# than this machine runs, through apt and from the mirror that the machine itself uses. apt checks
-# their signatures as it does for everything else. Needs no root: all of apt's own state for the
-# newer release lies in a private folder, so that the machine's package lists stay as they are.
-# A tarball reaches FOLDER only when it has the SHA-256 that sources.sha256 states for it.
+# than this machine runs. They come through apt, from the mirror that the machine itself uses. apt
+# checks their signatures as it does for everything else. Needs no root: all of apt's own state for
+# the newer release lies in a private folder. The machine's package lists stay as they are. A
+# tarball reaches FOLDER only when it has the SHA-256 that sources.sha256 states for it.
 set -euo pipefail
 sums=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)/sources.sha256
 suite=${UNDERSTORY_SOURCE_SUITE:-trixie}

@@ -46,8 +46,8 @@ struct CommandContext {
 // The work of the chosen subcommand; returns an exit code or throws an Error.
 using Command = std::function<int(CommandContext&)>;
 
-// Each subcommand is one file with one function that adds it to the program: its options, a footer
-// with an example, and a callback that sets `chosen`.
+// Each subcommand is one file with one function that adds it to the program. It has its options, a
+// footer with an example, and a callback that sets `chosen`.
 void add_map_command(CLI::App& app, Command& chosen);
 void add_demo_command(CLI::App& app, Command& chosen);
 void add_correct_command(CLI::App& app, Command& chosen);

@@ -45,9 +45,9 @@ int run_guarded(const Command& command, CommandContext& context) {
   } catch (const ConfigError& error) {
     return complain(kExitUsage, error.what());
   } catch (const InputError& error) {
-    return complain(kExitBadInput, with_names_asked_for(error.what()));
+    return complain(kExitBadInput, with_final_names(error.what()));
   } catch (const OutputError& error) {
-    return complain(kExitBadInput, with_names_asked_for(error.what()));
+    return complain(kExitBadInput, with_final_names(error.what()));
   } catch (const std::bad_alloc&) {
     return complain(kExitDefect, "out of memory");
   } catch (const std::exception& error) {

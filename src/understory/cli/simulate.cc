@@ -142,7 +142,7 @@ std::unique_ptr<LasWriter> write_points(const std::string& folder, Simulator& si
   LasOptions options;
   options.trees = true;
   auto writer = std::make_unique<LasWriter>(std::filesystem::path(folder) / "points.laz", options);
-  simulator.tell_points([&las = *writer](const std::vector<TruePoint>& points) {
+  simulator.set_point_sink([&las = *writer](const std::vector<TruePoint>& points) {
     for (const TruePoint& point : points) {
       LasRecord record;
       record.x = point.place.x();
@@ -159,8 +159,8 @@ std::unique_ptr<LasWriter> write_points(const std::string& folder, Simulator& si
   return writer;
 }
 
-// No file that the site is read from is replaced, by whichever of the outputs; and every place is
-// looked at before anything is made in one of them.
+// Refuses any output that would replace a file from which the site is read. Every place is looked
+// at before anything is made in one of them.
 void refuse_places(const SimulateOptions& options, bool capture) {
   std::vector<std::filesystem::path> inputs;
   for (const std::string& file : site_files(options.site, options.settings))

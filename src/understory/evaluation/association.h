@@ -9,8 +9,8 @@
 
 namespace understory::internal {
 
-// Pairs of indices of two lists with a `stamp`, both ascending: each item of the shorter list with
-// the nearest of the longer within the tolerance; the earlier one of two equally near.
+// Pairs of indices of two lists with a `stamp`, both ascending. Each item of the shorter list goes
+// with the nearest of the longer within the tolerance, the earlier one of two equally near.
 template <typename A, typename B>
 std::vector<std::pair<std::size_t, std::size_t>> nearest_in_time(const std::vector<A>& a,
                                                                  const std::vector<B>& b,

@@ -90,8 +90,8 @@ inline constexpr double kThinnestMedianM = 0.01;
 inline constexpr double kThickestCentimetres = 120.0;
 // Diameters, or pairs of them, that tell anything at least [chosen]
 inline constexpr std::size_t kLeastKnown = 5;
-// Median ratio of the diameters of two lists of one stand at most; two methods differ by 1.4 where
-// one sees stems from afar, radii by 2, feet by 3.3 [docs/reference/stems.md]
+// Largest median ratio of the diameters of two lists of one stand. Two methods differ by 1.4 where
+// one sees stems from afar; radii differ by 2, feet by 3.3 [bound: between 1.4 and 2]
 inline constexpr double kMostRatio = 1.8;
 // m: two stems do not stand so near each other [bound: the thinnest stems; four lists of real plots
 // have 3 such rows in 5,268]

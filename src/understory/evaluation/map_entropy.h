@@ -13,7 +13,7 @@ struct MapEntropyConfig {
   double radius_m = 0.3;  // neighbours of a point are nearer than this
   // Points without so many neighbours, themselves included, have no entropy [chosen].
   int fewest_neighbours = 10;
-  // Standard deviation that is added to each axis, metres: the logarithm of a flat surface's
+  // Standard deviation that is added to each axis, metres. The logarithm of a flat surface's
   // covariance stays finite, and steps of the file's coordinates do not count [chosen: 1 mm].
   double least_sd_m = 0.001;
   // One point (the first) is left in each cube of this edge, so that maps of other densities

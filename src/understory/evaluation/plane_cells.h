@@ -9,8 +9,7 @@
 namespace understory {
 
 // Places in the plane, sorted into square cells, so that those near a place are found in constant
-// time wherever the others lie: a place far away does not make the cells larger. Metres. Immutable,
-// thread-safe.
+// time. A place far away does not make the cells larger. Metres. Immutable, thread-safe.
 class PlaneCells {
  public:
   // `x_of(k)` and `y_of(k)`: finite coordinates of the place k of `n`. `reach_m`: how far is looked

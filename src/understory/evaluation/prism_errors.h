@@ -23,10 +23,10 @@ struct PrismErrors {
   double ape_max_m = 0.0;
 };
 
-// Holds an estimate against the places of a prism at `prism_in_body` (the lever arm, metres): each
-// place with the pose nearest in time, at most tolerance_s away, nothing interpolated. Alignment by
-// least squares over the prism's places; kFirst is a ConfigError, as a place has no attitude.
-// Nothing if no times agree.
+// Compares an estimate with the places of a prism at `prism_in_body` (the lever arm, metres). Each
+// place goes with the pose nearest in time, at most tolerance_s away; nothing is interpolated.
+// Alignment by least squares over the prism's places; kFirst is a ConfigError, as a place has no
+// attitude. Nothing if no times agree.
 [[nodiscard]] std::optional<PrismErrors> evaluate_prism(const Trajectory& estimate,
                                                         const std::vector<StampedPoint>& truth,
                                                         const Eigen::Vector3d& prism_in_body,

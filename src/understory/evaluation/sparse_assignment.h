@@ -21,9 +21,9 @@ struct SparseCosts {
 inline constexpr std::size_t kNoColumn = std::numeric_limits<std::size_t>::max();
 
 // The one-to-one assignment of rows to columns of least cost, where a row without a column costs
-// `unassigned_cost`: the column of each row, kNoColumn without one. Exact: shortest augmenting
-// paths with dual variables, over the edges alone (Jonker and Volgenant 1987). A path is never
-// longer than `unassigned_cost`, so it stays among near rows and the time grows nearly as the
+// `unassigned_cost`. Gives the column of each row, kNoColumn without one. Exact: shortest
+// augmenting paths with dual variables, over the edges alone (Jonker and Volgenant 1987). A path is
+// never longer than `unassigned_cost`, so it stays among near rows and the time grows nearly as the
 // edges. Of several best assignments the order of the input takes one.
 [[nodiscard]] std::vector<std::size_t> least_cost_assignment(const SparseCosts& costs,
                                                              double unassigned_cost);

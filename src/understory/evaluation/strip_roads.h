@@ -45,8 +45,8 @@ struct RoadConsistency {
 };
 
 // All pairs of neighbouring roads. Compared are the trees that lie within `within_m` of the line
-// half way between the roads and beside both: those that both roads can have seen, within 20 to
-// 30 m. Trees that were felled between the passes count against it.
+// half way between the roads, and beside both. Both roads can have seen those, from 20 to 30 m.
+// Trees that were felled between the passes count against it.
 [[nodiscard]] std::vector<RoadConsistency> road_consistencies(
     const std::vector<StemView>& views, const std::vector<Pose>& world_from_body,
     const StripRoadConfig& config);

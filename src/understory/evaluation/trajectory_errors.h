@@ -21,15 +21,15 @@ struct EvaluationOptions {
 // An index into the estimate and one into the truth.
 using PosePair = std::pair<std::size_t, std::size_t>;
 
-// Pairs each pose of the trajectory with fewer poses with the one of the other nearest in time, if
-// it is within the tolerance; never interpolates. A pose of the longer one may serve twice where
-// the shorter one is denser for a while, as in evo's association, which this follows.
+// Pairs each pose of the trajectory with fewer poses with the one of the other nearest in time. The
+// pair must be within the tolerance; nothing is interpolated. A pose of the longer one may serve
+// twice where the shorter one is denser for a while, as in evo's association, which this follows.
 [[nodiscard]] std::vector<PosePair> associate(const Trajectory& estimate, const Trajectory& truth,
                                               double tolerance_s);
 
-// Relative pose error, P2 T1: consecutive, non-overlapping pairs of poses, each the first at which
-// the estimate's path since the pair's first pose reaches delta, as evo_rpe makes them with
-// `--delta D -u m`.
+// Relative pose error, P2 T1: consecutive, non-overlapping pairs of poses, as evo_rpe makes them
+// with `--delta D -u m`. A pair ends at the first pose at which the estimate's path since its first
+// pose reaches delta.
 struct RelativeError {
   double delta_m = 0.0;
   std::size_t pairs = 0;
@@ -38,8 +38,8 @@ struct RelativeError {
   double rotation_rmse_deg = 0.0;
 };
 
-// KITTI's segment error: the mean over segments of one length of the truth, started every tenth
-// pair, of the end's error after aligning the segment's first pose.
+// KITTI's segment error. It is the mean of the end's error after aligning the first pose, over
+// segments of one length of the truth. A segment starts at every tenth pair.
 struct SegmentError {
   double length_m = 0.0;
   std::size_t segments = 0;

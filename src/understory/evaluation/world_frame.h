@@ -17,8 +17,8 @@ enum class WorldFrame { kEnu, kNed };
 // the line between x and y, leads there and back.
 [[nodiscard]] Eigen::Vector3d turned_axes(const Eigen::Vector3d& in_world);
 
-// Names of the files of a run that hold world coordinates as text, and that are turned:
-// trajectories, states, graph, fixes, trees, stem curves, falls, cuts, plots.
+// Names of the files of a run that hold world coordinates as text, and that are turned. They are
+// trajectories, states, graph, fixes, trees, stem curves, falls, cuts and plots.
 [[nodiscard]] const std::vector<std::string>& world_files();
 // What `frames` of run.json says of them: "world" or "world_ned".
 [[nodiscard]] std::string frame_name(WorldFrame frame);

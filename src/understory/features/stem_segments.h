@@ -33,8 +33,8 @@ struct StemSegment {
   double highest_m = 0.0;  // ... and last seen
   double radius_m = 0.0;   // best guess, from its own width and those of the others
   double radius_sd_m = 0.0;
-  // From its own width 0.5 to 2.3 m above the ground; 0 where it was not seen whole there, or too
-  // far away: where fewer than three returns fall on a stem it looks thin.
+  // From its own width 0.5 to 2.3 m above the ground. 0 where it was not seen whole there, or where
+  // fewer than three returns fall on it: it then looks thin.
   double dbh_m = 0.0;
   double dbh_sd_m = 0.0;
   double score = 0.0;     // probability that this is a stem, 0..1
@@ -67,12 +67,12 @@ struct StemSegments {
 //
 // Each ring is cut into narrow runs of returns with a step in depth at both sides. Runs of
 // different rings that lie on one upright line are gathered into segments by a sequential
-// least-squares fit, which also counts the beams that passed the line where the stem should have
+// least-squares fit. The fit also counts the beams that passed the line where the stem should have
 // stopped them. The surface that the beams hit lies in front of the centre by pi/4 of the radius in
-// the mean over the width (P1 figure 11); the radius comes from the widths of all runs together.
+// the mean over the width (P1 figure 11). The radius comes from the widths of all runs together.
 //
-// `use` has an entry a point of the scan, 0 for what is on the machine that carries the lidar (it
-// hides what lies behind and is never a stem); empty: all are used.
+// `use` has an entry a point of the scan; empty: all are used. 0 is what is on the machine that
+// carries the lidar: it hides what lies behind and is never a stem.
 //
 // Empty for a frame without rings. Deterministic; thread-safe. P1 section 2.3 and figure 11.
 [[nodiscard]] StemSegments find_stem_segments(const Scan& scan, const StemSegmentConfig& config,

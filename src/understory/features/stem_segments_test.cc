@@ -93,8 +93,8 @@ TEST(StemSegments, CentresAreNotDrawnTowardsTheScanner) {
     bias += (stem->foot - foot).head<2>().dot(foot.head<2>().normalized());
     lean += stem->axis.head<2>().dot(foot.head<2>().normalized()) / stem->axis.z();
   }
-  // The surface that faces the scanner leans back as the stem tapers: a view to one side only would
-  // take up to be as much off (0.34 degrees here).
+  // The surface that faces the scanner leans back as the stem tapers. In a view to one side only,
+  // up would be off by as much (0.34 degrees here).
   EXPECT_NEAR(lean / static_cast<double>(cylinders.size()), 0.0, 0.2 * kDegree);
   // The mean of the returns themselves lies pi/4 of the radius, 8 cm, too near.
   EXPECT_NEAR(bias / static_cast<double>(cylinders.size()), 0.0, 0.006);
@@ -105,8 +105,8 @@ TEST(StemSegments, StandsByTheStemsWhereTheSensorIsTilted) {
   Scan scan = scan_cylinders(cylinders);
   const Eigen::Quaterniond tilt(
       Eigen::AngleAxisd(12.0 * kDegree, Eigen::Vector3d(1.0, 0.4, 0.0).normalized()));
-  // The same returns told in a tilted frame: its rings are no longer cones about z, so only the
-  // direction of up is asked for here.
+  // The same returns told in a tilted frame. Its rings are no longer cones about z, so only the
+  // direction of up is tested here.
   for (ScanPoint& point : scan.points) {
     const Eigen::Vector3f turned = tilt.cast<float>() * Eigen::Vector3f(point.x, point.y, point.z);
     point.x = turned.x();
@@ -178,8 +178,8 @@ StemBand within_15_m(TestFrames& site, int every) {
 // Seeds that the score was not fitted to.
 TEST(StemSegments, AreFoundInFramesOfSixteenRings) {
   TestFrames site(load_site("lieksa2", {"seed=5"}));
-  // 2.3 cm in 31 frames. Neither oval sections nor bark add to it (round stems give the same),
-  // crowns do: what looks like a stem in one, up to 40 cm from its tree, counts as right. One such
+  // 2.3 cm in 31 frames. Neither oval sections nor bark add to it: round stems give the same.
+  // Crowns do: what looks like a stem in one, up to 40 cm from its tree, counts as right. One such
   // segment makes 3.1 cm of 2.0 in 13 frames.
   const StemBand near = within_15_m(site, 1120);
   EXPECT_GT(near.clear, 500);

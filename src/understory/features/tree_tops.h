@@ -14,7 +14,7 @@ struct TreeTopConfig {
   double window_m = 1.0;     // radius in the plane in which a top is the highest point
   double neighbour_m = 1.5;  // radius in space of the points around a top
   int least_neighbours = 8;  // with fewer points around it a top is not judged and left out
-  // Smallest eigenvalue of the scatter matrix of the points around a top, P2 (1), square metres: a
+  // Smallest eigenvalue of the scatter matrix of the points around a top, P2 (1), square metres. A
   // crown spreads in all directions, a wire or a wall does not.
   double least_eigenvalue_m2 = 0.01;
   double least_z_m = -1e9;  // no top lower

@@ -14,8 +14,8 @@
 
 namespace understory {
 
-// A grid of small records over an area whose bounds are not known beforehand: blocks of cells that
-// come to be where something falls into them. Cells hold what does not depend on the order of work
+// A grid of small records over an area whose bounds are not known beforehand. A block of cells is
+// made where something first falls into it. Cells hold what does not depend on the order of work
 // inside the cloud. Not thread-safe.
 template <typename Cell>
 class CellGrid {
@@ -51,7 +51,7 @@ class CellGrid {
     return &block->second->cells[index_in(block->first, column, row)];
   }
 
-  // The blocks' bounds in cells. A few stray points far away must not make the area huge: where it
+  // The blocks' bounds in cells. A few stray points far away must not make the area huge. Where it
   // has more than `most` cells, blocks with fewer than `few` points are left out.
   [[nodiscard]] Bounds bounds(std::uint64_t most, std::uint64_t few) const {
     Bounds all = bounds_of(0);

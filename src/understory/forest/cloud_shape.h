@@ -25,11 +25,11 @@ inline constexpr std::array<UpAxis, 6> kUpAxes = {
 struct CloudShape {
   std::size_t points = 0;                            // looked at: 400,000 at most
   Eigen::Vector3d extent = Eigen::Vector3d::Zero();  // between the 0.2 and 99.8 percentiles
-  // Median step of the lowest points from cell to cell that is no slope, over the size of a cell,
-  // seen with each axis as up (order of kUpAxes). Ground: under 0.2. NaN: too few cells.
+  // Median step of the lowest points from cell to cell that is no slope, over the size of a cell.
+  // One value for each axis taken as up (order of kUpAxes). Ground: under 0.2. NaN: too few cells.
   std::array<double, 6> roughness{};
-  // From the lowest to the highest point of a column that holds more than nine tenths of the
-  // others, less what the ground rises within it. NaN: too few columns.
+  // From the lowest to the highest point of a column, less what the ground rises within it. Nine
+  // tenths of the columns are lower. NaN: too few columns.
   double column_height = 0.0;
   // Of the plane through the lowest points, z = slope * (x, y) + constant; NaN: unknown.
   Eigen::Vector2d ground_slope = Eigen::Vector2d::Zero();

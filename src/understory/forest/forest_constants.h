@@ -81,7 +81,7 @@ inline constexpr double kCube = 3.0;
 inline constexpr std::size_t kLeastColumns = 4;
 // Share of the points at each end of an axis that do not count for the extent [not recorded]
 inline constexpr double kOutliers = 0.002;
-// The upper end of that range [not recorded]
+// The upper end of that range [bound: 1 - kOutliers]
 inline constexpr double kUpperEnd = 0.998;
 // Quantile of the heights in a cell that is its ground [not recorded]
 inline constexpr double kLowQuantile = 0.01;
@@ -102,8 +102,8 @@ namespace inventory {  // forest/inventory.cc
 inline constexpr double kAreaCell = 2.0;
 // m above the ground: higher points are no tree [bound: the tallest trees have 116 m]
 inline constexpr double kHighest = 120.0;
-// m: the origin of slices and stems is a multiple of it, as it is one of the cells of all grids
-// (1.5, 2, 8, 12 and 20 cm; 0.5, 1, 2 and 8 m) [chosen]
+// m: the origin of slices and stems is a multiple of it. It is itself a multiple of the cells of
+// all grids (1.5, 2, 8, 12 and 20 cm; 0.5, 1, 2 and 8 m) [chosen]
 inline constexpr double kOriginStep = 48.0;
 // m around a stem whose points are kept for a look at it [chosen]
 inline constexpr double kSegmentReach = 1.5;

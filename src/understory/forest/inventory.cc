@@ -22,7 +22,7 @@ namespace {
 using namespace forest_constants::inventory;
 
 // Area in which stems could be seen: squares of 2 m with points near breast height or on the
-// ground, that is all in which the cloud holds anything.
+// ground. That is all in which the cloud holds anything.
 double area_of(const Raster& canopy) {
   CellGrid<char> seen(kAreaCell);
   for (int row = 0; row < canopy.rows; ++row) {

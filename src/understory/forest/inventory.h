@@ -106,8 +106,9 @@ struct InventoryResult {
 [[nodiscard]] std::uint32_t tree_at(const InventoryResult& inventory, const TreeOwners& owners,
                                     const Eigen::Vector3d& point, double height_m);
 
-// The stems of an inventory as one view of them: foot and centre line, world frame without its
-// `origin` (metres, world frame), so that single precision is enough. In the order of the trees.
+// The stems of an inventory as one view of them: foot and centre line, in metres in the world
+// frame. `origin` (metres, world frame) is taken away, so that single precision is enough. In the
+// order of the trees.
 [[nodiscard]] std::vector<Stem> stems_of(const InventoryResult& inventory,
                                          const Eigen::Vector3d& origin);
 

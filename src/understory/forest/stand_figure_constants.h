@@ -6,11 +6,11 @@
 namespace understory::forest_constants {
 
 namespace stand_errors {  // forest/stand/stand_figures.cc
-// m: standard deviation of what all heights are too high or too low by; without it the mean height
-// of a plot would be surer than it is [tuned: seeds 3 and 4 of the site handheld, 0.3 m too high]
+// m: standard deviation of the error that all heights share; without it the mean height of a plot
+// would seem too certain [tuned: seeds 3 and 4 of the site handheld, 0.3 m too high]
 inline constexpr double kSharedHeightSd = 0.3;
-// Of a height by the height curve: standard deviation of what the curve of a stand is too high or
-// too low by beyond its fit, where the view hides all tops of the plot; less by their share [tuned:
+// Standard deviation of the error of a stand's height curve beyond its fit, as a share of the
+// height. It holds where all tops of the plot are hidden, else in proportion to their share [tuned:
 // random seeds 4, 8, 9, 14, 16, handheld seed 3: -20 to +5 %]
 inline constexpr double kCurveBias = 0.1;
 }  // namespace stand_errors
@@ -24,8 +24,8 @@ inline constexpr std::uint8_t kNotSparse = 2;
 // m beyond the surface of a stem: its returns do not count for the density, or every stem would
 // stand where it is dense [chosen]
 inline constexpr double kBesideStem = 0.5;
-// Share of the cells around that hold a return, over its median in the cloud: a thinned cloud shows
-// stems with fewer returns on the ground [real clouds: one has 8 of them per square metre]
+// Least share of the cells around that hold a return, over its median in the cloud. A thinned cloud
+// shows stems with fewer returns on the ground [real clouds: one has 8 of them per square metre]
 inline constexpr double kOfMedian = 0.25;
 // The least such share, one return on two square metres [chosen]
 inline constexpr double kThinnedShare = 0.03;

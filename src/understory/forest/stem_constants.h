@@ -263,8 +263,8 @@ namespace beam_footprint {  // forest/stems/beam_footprint.cc
 inline constexpr double kBark = 0.5;
 // Cosine of incidence at least: bark is rough [chosen]
 inline constexpr double kLeastCosine = 0.08;
-// Part of a beam that has to be on the stem for half of the echoes to be its own: with less, what
-// lies behind is stronger [tuned with kOneSided: 0.1, 0.15 and 0.2 were tried]
+// Part of a beam that must be on the stem so that half of its echoes are the stem's own. With less,
+// the echo from behind is stronger [tuned with kOneSided: 0.1, 0.15 and 0.2 were tried]
 inline constexpr double kLeastPart = 0.1;
 // Of the excess of the width, that of the radius of a stem seen from one side; twice as much as at
 // half a circumference [tuned on random seeds 1 to 5, 8 to 10, 12 to 16, 18; true poses]

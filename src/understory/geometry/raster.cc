@@ -48,7 +48,7 @@ double Raster::interpolate(double x, double y) const {
   return weights >= 0.25 ? z0 + sum / weights : kUnknown;
 }
 
-Raster raised_by(const Raster& ground, const Raster& above) {
+Raster absolute_heights(const Raster& ground, const Raster& above) {
   Raster surface = above;
   surface.z0 = ground.z0;
   for (int row = 0; row < above.rows; ++row) {

@@ -46,6 +46,6 @@ struct Raster {
 
 // Heights over the cells of `above`, whose own are heights above the ground: those of the ground
 // are added. NaN where either is. Both in one frame.
-[[nodiscard]] Raster raised_by(const Raster& ground, const Raster& above);
+[[nodiscard]] Raster absolute_heights(const Raster& ground, const Raster& above);
 
 }  // namespace understory

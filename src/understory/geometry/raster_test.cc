@@ -25,7 +25,7 @@ TEST(Raster, HeightsAboveTheGroundAreRaisedByIt) {
   canopy.columns = 3;
   canopy.rows = 1;
   canopy.values = {20.0F, kUnknown, 0.0F};
-  const Raster surface = raised_by(slope(), canopy);
+  const Raster surface = absolute_heights(slope(), canopy);
   EXPECT_EQ(surface.x0, 10.5);
   EXPECT_EQ(surface.cell_m, 0.5);
   EXPECT_NEAR(surface.cell_value(10.75, 0.25), 220.25, 1e-5) << "the slope between two centres";
@@ -38,7 +38,7 @@ TEST(Raster, WhereTheGroundIsNotKnownTheSurfaceIsNotEither) {
   ground.values.assign(6, kUnknown);
   Raster canopy = slope();
   canopy.z0 = 0.0;
-  for (const float value : raised_by(ground, canopy).values)
+  for (const float value : absolute_heights(ground, canopy).values)
     EXPECT_TRUE(std::isnan(value));
 }
 

@@ -20,8 +20,9 @@ struct SymmetricEigen3 {
   Eigen::Matrix3d vectors;
 };
 
-// Of a symmetric, finite matrix, by its characteristic polynomial: several times as fast as QR
-// steps, with values that are off by some 1e-8 of the largest. For the scatter of points in space.
+// Of a symmetric, finite matrix, by its characteristic polynomial. It is several times as fast as
+// QR steps, with values that are off by some 1e-8 of the largest. For the scatter of points in
+// space.
 [[nodiscard]] SymmetricEigen3 fast_symmetric_eigen(const Eigen::Matrix3d& matrix);
 
 // The eigenvalues alone, ascending, by QR steps: to the last digits.

@@ -26,8 +26,8 @@ struct CombinedPlace {
   double disagreement = 0.0;
 };
 
-// The most probable motion where the errors of the sources are independent: separate degrees of
-// freedom, each by what knows it (P4 section 5.3 and its future work). What no source tells stays
+// The most probable motion where the errors of the sources are independent. Each source fixes the
+// degrees of freedom that it knows (P4 section 5.3 and its future work). What no source tells stays
 // as the first one has it, with a spread of kilometres. `sources` must not be empty.
 [[nodiscard]] CombinedPlace combine_places(const std::vector<PlaceEvidence>& sources);
 

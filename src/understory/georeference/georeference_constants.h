@@ -388,9 +388,9 @@ inline constexpr double kLeastGrownM = 0.5;
 inline constexpr double kGrownMatches = 0.6;
 }  // namespace tree_match
 namespace layer_frame {  // georeference/systems/layer_frame.cc
-// m: nodes of the grid that points are interpolated in. The level plane leaves the ellipsoid by
-// the square of the distance over twice the radius of the earth: 0.04 mm in the middle of a cell
-// [bound: geometry]
+// m: nodes of the grid that points are interpolated in. The level plane leaves the ellipsoid by the
+// square of the distance over twice the radius of the earth. In the middle of a cell that is 0.04
+// mm [bound: geometry]
 inline constexpr double kGridM = 32.0;
 // cells from the origin: farther points go through PROJ one by one [bound: 32 bits]
 inline constexpr double kMostCells = 1e6;

@@ -259,8 +259,8 @@ std::vector<std::pair<double, Motion>> starts(const std::vector<Vector3d>& path,
   return ends;
 }
 
-// Along a road that is nearly straight nearest points hardly pull, and the descent ends early:
-// begun again from places before and behind, until none is better.
+// Along a nearly straight road nearest points hardly pull, and the descent ends early. It begins
+// again from places before and behind, until none is better.
 Motion slid(const Fitter& fitter, Motion best, const Vector2d& along, bool robust) {
   const auto width = [&](const Motion& motion) {
     return robust ? Fitter::width_of(fitter.pairs(motion))
@@ -282,7 +282,7 @@ Motion slid(const Fitter& fitter, Motion best, const Vector2d& along, bool robus
   return best;
 }
 
-// How many fixes with independent errors the fixes in their order are worth: a receiver errs
+// The number of independent fixes that are worth as much as these, in their order. A receiver errs
 // slowly, so fixes that follow each other say nearly the same.
 double independent_fixes(const std::vector<Vector3d>& path, const std::vector<Vector3d>& fixes,
                          const Motion& motion, double width_m) {
@@ -313,8 +313,8 @@ double independent_fixes(const std::vector<Vector3d>& path, const std::vector<Ve
   return static_cast<double>(errors.size()) / time;
 }
 
-// From the profile of the robust sum over the heading: where turning by an angle, with the best
-// shift for it, costs as much as one standard deviation does. Straight, short and round paths have
+// From the profile of the robust sum over the heading, with the best shift for each. The result is
+// the turn that costs as much as one standard deviation does. Straight, short and round paths have
 // flat profiles. Half of the wider side and the narrower one, at most 90 degrees.
 double heading_sd_deg(const Fitter& fitter, const Motion& best, double width_m,
                       double independent) {

@@ -9,9 +9,9 @@
 
 namespace understory {
 
-// Fit of an odometry path to a GNSS path by one rigid motion in the plane, P1 (6): it asks for no
-// common clock, only that both went the same way. Nearest points are taken both ways, so that
-// neither path can hide in a part of the other.
+// Fit of an odometry path to a GNSS path by one rigid motion in the plane, P1 (6). It needs no
+// common clock, only the same way. Nearest points are taken both ways, so that neither path can
+// hide in a part of the other.
 struct PathFitConfig {
   // As printed every pair counts alike, and a receiver that ran away for a minute draws the path
   // along. Robust: pairs count by Tukey's biweight, whose width comes from the pairs themselves.
@@ -35,12 +35,12 @@ struct PathFit {
   double path_mean_m = 0.0;
   std::vector<double> fix_distance_m;  // one per fix
   std::vector<char> fix_used;          // 0: so far off that it was not used (robust only)
-  // Root of (6) at the best motion that is turned by more than 20 degrees from this one: a path
-  // that is straight fits the other way round as well.
+  // Root of (6) at the best motion that is turned by more than 20 degrees from this one. A straight
+  // path fits the other way round as well.
   double turned_rms_m = 0.0;
   Pose turned_target_from_source;
-  // Standard deviation of the heading that the fixes leave, degrees, at most 90: from how (6) rises
-  // when the path is turned, its residuals, and how many fixes err independently of each other.
+  // Standard deviation of the heading that the fixes leave, degrees, at most 90. It comes from how
+  // (6) rises when the path turns, its residuals, and the number of independent fixes.
   double heading_sd_deg = 0.0;
 };
 

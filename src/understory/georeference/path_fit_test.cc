@@ -160,7 +160,7 @@ TEST(PathFit, ANearlyStraightWayIsNotLeftHalfWay) {
   }
 }
 
-// A road that winds every 8 m: laid one bend too far along it fits as well nearly everywhere, and
+// A road that winds every 8 m. Laid one bend too far along, the path fits nearly everywhere, and
 // the search from the middles, which do not fit, ends there. One bend is different.
 TEST(PathFit, AWindingWayIsNotLeftABendTooFar) {
   const auto at = [](double s) {

@@ -23,7 +23,7 @@ struct PlaneArea {
 // too, in the system's own metres.
 //
 // Only the part over `area` is read. Throws InputError where the file is no raster of heights, is
-// rotated, does not reach the area, or is in degrees and there is no origin.
+// rotated, or does not reach the area. So it does where it is in degrees and there is no origin.
 [[nodiscard]] Raster read_terrain(const std::filesystem::path& path, const PlaneArea& area,
                                   const std::optional<GeodeticPlace>& origin);
 

@@ -11,15 +11,15 @@
 
 namespace understory {
 
-// Levelling to a terrain model by one rigid motion, robust least squares over the heights of points
-// on the ground (stem feet, or cells of an own terrain model) above it (P1 section 3, table 1).
+// Levelling to a terrain model by one rigid motion (P1 section 3, table 1). Robust least squares
+// fit the heights of points on the ground: stem feet, or cells of an own terrain model.
 struct TerrainFitConfig {
   // How far off the place and the heading may be to begin with: 0 keeps them, so that only height
   // and tilt are fitted. Otherwise the relief moves them, as far as it can tell.
   double place_sd_m = 0.0;
   double yaw_sd_deg = 0.0;
-  // Heights of a terrain model err together over that far, so points nearer to each other count as
-  // one when it is judged how much the relief tells.
+  // Heights of a terrain model err together over that far. Points nearer to each other count as one
+  // in the judgement of how much the relief tells.
   double correlation_m = 5.0;
   // What other sources know of the place that the points were laid on; place_sd_m and yaw_sd_deg
   // do not count then.
@@ -47,8 +47,8 @@ struct TerrainFit {
   // What is still uncertain after the fit, one standard deviation.
   double place_sd_m = 0.0;
   double yaw_sd_deg = 0.0;
-  // The same for all degrees of freedom: the covariance of a turn through `middle` (the points'
-  // mean after the fit) about the axes of the terrain model (rad), then a shift (m).
+  // The same for all degrees of freedom: the covariance of a turn about the axes of the terrain
+  // model (rad), then a shift (m). The turn is through `middle`, the points' mean after the fit.
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   Matrix6d spread = Matrix6d::Zero();
 };

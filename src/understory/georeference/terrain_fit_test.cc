@@ -38,8 +38,8 @@ Raster raster_of(double relief) {
   return raster;
 }
 
-// Feet on the terrain, 10 cm of noise, every tenth hidden so that it looks a metre too high, seen
-// by a map that `world_from_terrain` has bent.
+// Feet on the terrain with 10 cm of noise, seen by a map that `world_from_terrain` has bent. Every
+// tenth is hidden, so that it looks a metre too high.
 std::vector<GroundPoint> feet(const Raster& terrain, const Pose& world_from_terrain) {
   std::mt19937 random(2);
   std::normal_distribution<double> noise(0.0, 0.1);

@@ -29,8 +29,8 @@ struct GnssObservation {
   double azimuth_sd_rad = 1.0;
 };
 
-// How positions by satellites err, standard deviations in metres: a slow part that is correlated
-// over time (a first-order Gauss-Markov process), and a fast part that is not.
+// How positions by satellites err, standard deviations in metres. The slow part is correlated over
+// time (a first-order Gauss-Markov process), the fast part is not.
 struct GnssErrors {
   double slow_plane_m = 2.0;  // each axis
   double fast_plane_m = 0.5;

@@ -32,16 +32,16 @@ struct SharpnessConfig {
 [[nodiscard]] double blur_ratio_3d(const SparsePoints& map, const SharpnessConfig& config);
 
 // Box-counting dimension, P0 section 4: slope of the logarithm of the number of occupied cells over
-// that of their fineness, by least squares over cells of 1, 2, 4 and 8 times `fine_m`, in which
-// trees stay apart. 0 for points, 1 for lines, 2 for areas (seen from above), 3 (in space).
+// that of their fineness. Least squares over cells of 1, 2, 4 and 8 times `fine_m`, in which trees
+// stay apart. 0 for points, 1 for lines, 2 for areas (seen from above), 3 (in space).
 [[nodiscard]] double box_dimension(const SparsePoints& map, const SharpnessConfig& config,
                                    bool in_space);
 
 // Tree registration noise, P0 section 2.5 and (33): distances of sights from the mean of their
-// cluster, seen from above. The paper's e_C is over all clusters. A cluster of which a view in five
-// or more has two sights is several trees side by side, whose sights have run together: its width
-// is no noise, so ours leaves it out. (On a simulated site one such pair among 596 trees took e_C
-// from 4.9 to 7.4 cm.)
+// cluster, seen from above. The paper's e_C is over all clusters. A cluster is several trees side
+// by side where a view in five or more has two sights of it. Their sights have run together and the
+// width is no noise, so ours leaves it out. (On a simulated site one such pair among 596 trees took
+// e_C from 4.9 to 7.4 cm.)
 struct RegistrationNoise {
   // e_C by (33), as the paper has it: root mean square over the sights of all clusters, metres. NaN
   // without a cluster.

@@ -127,9 +127,9 @@ Solved add_singly(const PoseGraphProblem& problem, const Solved& without,
   return solved;
 }
 
-// Takes over what was `decided` of the first loops, and decides the new ones by the truncated cost:
-// they are used where that costs less than to leave them out. Then the decisions have to be those
-// of their own solution: loops that are used lie within the truncation there, those that are not do
+// Takes over what was `decided` of the first loops, and decides the new ones by the truncated cost.
+// They are used where that costs less than to leave them out. Then the decisions have to be those
+// of their own solution. Loops that are used lie within the truncation there, those that are not do
 // not. Where few do not agree, they change sides; else nothing comes of it. `used`, in: the loops
 // that agree with each other.
 std::optional<Solved> keep_decisions(const PoseGraphProblem& problem, const gtsam::Values& first,

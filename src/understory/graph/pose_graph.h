@@ -24,10 +24,10 @@ struct PoseGraphConfig {
   // Probability with which a right loop lies within the truncation (6 degrees of freedom).
   double inlier_probability = 0.999;
   bool check_consistency = true;  // drop loops that contradict most others before optimising
-  // Two loops contradict each other when their circle does not close within this probability ...
+  // Two loops contradict each other when their circle does not close within this probability.
   double consistency_probability = 0.995;
-  // ... with the standard deviations of the odometry on the way taken that many times larger, as
-  // errors of odometry are not independent from edge to edge.
+  // For that the odometry's standard deviations on the way are taken that many times larger: its
+  // errors are not independent from edge to edge.
   double odometry_sigma_scale = 2.0;
   int max_iterations = 50;
   double relative_tolerance = 1e-9;

@@ -34,8 +34,8 @@ Matrix6d covariance(double rotation, double translation) {
   return c;
 }
 
-// Two rounds of a circle of 40 m diameter with keyframes every metre: odometry with noise, loops
-// from the second round to the first, a share of them wrong.
+// Two rounds of a circle of 40 m diameter with keyframes every metre. Odometry has noise, and a
+// share of the loops from the second round to the first is wrong.
 struct Rounds {
   std::vector<Pose> truth;
   PoseGraphProblem problem;
@@ -390,7 +390,7 @@ TEST(LoopSearch, AtMostOnceInItsTime) {
   EXPECT_TRUE(loop_search_due(0, 1'500'000'000, config));
 }
 
-// What the views know of up and what the step says weigh by their variances: the second keyframe
+// What the views know of up and what the step says weigh by their variances. The second keyframe
 // tilts by the weighted mean, worked out by hand for small angles.
 TEST(PoseGraph, TiltIsTheWeightedMeanOfTheStepsAndWhatTheKeyframesKnow) {
   PoseGraphProblem problem;

@@ -28,13 +28,13 @@ struct FelledConfig {
   double same_place_m = 0.0;
 
   // Where nobody fells. Undergrowth that is no stem hides a tree from one side and not from the
-  // other, so only a view from where the tree was seen before tells that it is gone.
+  // other. So only a view from where the tree was seen before tells that it is gone.
   [[nodiscard]] static FelledConfig unattended();
 };
 
-// Trees that were seen as a rule until some view and never again, although later views had them
-// in their sector, near and with no other stem before them. How often a tree is missed as a rule
-// is taken from the views before. Views are in the order of time. Deterministic; thread-safe.
+// Trees that were seen as a rule until some view and never again. Later views had them in their
+// sector, near and with no other stem before them. How often a tree is missed as a rule is taken
+// from the views before. Views are in the order of time. Deterministic; thread-safe.
 [[nodiscard]] std::vector<FelledTree> felled_trees(const std::vector<StemView>& views,
                                                    const std::vector<Pose>& world_from_body,
                                                    const std::vector<MappedStem>& trees,

@@ -13,8 +13,8 @@ struct Walk {
   std::vector<Pose> poses;
 };
 
-// 100 views from 1.5 m above a slope of 10 %, tilted by 6 degrees; `lift_m(view)` moves all feet of
-// a view down, as a terrain model does that runs below the ground.
+// 100 views from 1.5 m above a slope of 10 %, tilted by 6 degrees. `lift_m(view)` moves all feet of
+// a view down, as a terrain model below the ground does.
 template <typename Lift>
 Walk walk(const Lift& lift_m, int feet = 6) {
   Walk result;

@@ -56,7 +56,7 @@ class LocalMap {
   void clear();
   // What it takes, about (TargetBuilder::bytes).
   [[nodiscard]] double bytes() const { return builder_->bytes(); }
-  // The radius of now, and the radius that it had when it was empty: an empty map with that radius
+  // The present radius, and the radius of the map when it was empty. An empty map with that radius
   // and the same insertions becomes the same map again.
   [[nodiscard]] double radius_m() const { return radius_m_; }
   [[nodiscard]] double first_radius_m() const { return first_radius_m_; }
@@ -81,7 +81,7 @@ class LocalMap {
     const std::vector<Eigen::Vector3d>& positions, const LocalMapConfig& config);
 
 // All keyframes, of those at these positions, that lie within the radius of the last one, as
-// insertions into an empty map; `first` is the index of the first position.
+// insertions into an empty map. `first` is the index of the first position.
 [[nodiscard]] std::vector<LocalMapInsertion> keyframes_within_reach(
     const std::vector<Eigen::Vector3d>& positions, std::size_t first, double radius_m);
 

@@ -50,10 +50,10 @@ struct JoinConfig {
   PoseGraphConfig graph;     // when two loops agree
 };
 
-// Which pieces are together after these attempts: two verified loops between them agree with each
-// other over the odometry within either piece, and their newer places lie `min_apart_m` of way
-// apart. One alone is not believed: a place that looks alike would join what is far apart.
-// `odometry`: the edges between neighbouring keyframes, one from each to the next.
+// Which pieces are together after these attempts. Two verified loops join two pieces if they agree
+// over the odometry within either piece, and their newer places lie `min_apart_m` of way apart. One
+// alone is not believed: a place that looks alike would join what is far apart. `odometry`: the
+// edges between neighbouring keyframes, one from each to the next.
 struct JoinedPieces {
   MapPieces pieces;
   std::vector<PieceJoin> joins;  // one for each two groups that came together, in that order

@@ -38,8 +38,8 @@ struct SearchedMap {
 void add_points_seen_from(const SearchedMap& map, std::size_t keyframe, std::size_t from,
                           Points& all);
 
-// The clouds of up to `reach` keyframes of the same piece on each side of one, along the path, in
-// its body frame, thinned by voxels of this edge.
+// The clouds of up to `reach` keyframes of the same piece on each side of one, along the path. They
+// are in its body frame, thinned by voxels of this edge.
 [[nodiscard]] Points points_around(const SearchedMap& map, std::size_t keyframe, int reach,
                                    double voxel_size_m);
 

@@ -16,7 +16,7 @@ namespace understory {
                                        const TreeChanges& changes);
 
 // Writes them as a GeoPackage with the layer `changes` where `path` ends in .gpkg, with places in
-// the frame of `layers`, else as CSV in the frame of the lists. Throws OutputError.
+// the frame of `layers`. Else it writes CSV in the frame of the lists. Throws OutputError.
 void write_changes(const std::filesystem::path& path, const PointTable& changes,
                    const LayerFrame& layers);
 

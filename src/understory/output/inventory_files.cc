@@ -23,7 +23,8 @@ void write_inventory_files(const std::filesystem::path& folder, const InventoryR
   }
   if (inventory.canopy.empty()) return;
   write_geotiff(folder / "chm.tif", inventory.canopy, crs);
-  write_geotiff(folder / "dsm.tif", raised_by(inventory.ground.terrain, inventory.canopy), crs);
+  write_geotiff(folder / "dsm.tif", absolute_heights(inventory.ground.terrain, inventory.canopy),
+                crs);
 }
 
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,

@@ -127,7 +127,7 @@ void write_raster_layers(const std::filesystem::path& folder, const Raster& terr
   if (canopy.empty()) return;
   const Raster above = moved_raster(canopy, terrain, change, CellHeights::kAboveGround);
   write_geotiff(folder / "chm.tif", above, layers.wkt(), "height of the canopy above the ground");
-  write_geotiff(folder / "dsm.tif", raised_by(ground, above), layers.wkt(),
+  write_geotiff(folder / "dsm.tif", absolute_heights(ground, above), layers.wkt(),
                 band_meaning("height of the surface, treetops included", layers));
 }
 

@@ -137,8 +137,8 @@ TEST_F(OutputTest, StatesHoldTheUpperTriangleAndCompressAlike) {
   EXPECT_NE(text.find(",4.500000000e+01,5.500000000e+01\n"), std::string::npos);
 }
 
-// The information that g2o gets must give the same cost for the same small motion, computed from
-// g2o's own error: translation and the vector part of the quaternion.
+// The information that g2o gets must give the same cost for the same small motion. The cost follows
+// from g2o's own error: translation and the vector part of the quaternion.
 TEST_F(OutputTest, G2oInformationGivesTheSameCost) {
   Random random(7);
   Matrix6d root;

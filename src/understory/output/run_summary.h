@@ -137,8 +137,8 @@ struct RunSummary {
   std::string lidar_model;                               // empty = unknown, or several
 };
 
-// Of a run at the speed of its sensors: milliseconds from the end of a scan to its pose, as the
-// figures latency_ms_mean, _p50, _p99 and _max.
+// Of a run at the speed of its sensors: milliseconds from the end of a scan to its pose. The
+// figures are latency_ms_mean, _p50, _p99 and _max.
 void add_latency(const Distribution& latency_ms, RunSummary& summary);
 
 // Writes run.json (keys of docs/reference/outputs.md); NaN becomes null.

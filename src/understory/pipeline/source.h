@@ -30,8 +30,8 @@ namespace understory {
                                                  const ProgressSink& progress = {});
 
 // The files and folders that opening a recording reads. They are the recording, parts of a bag
-// outside its folder, the metadata and extrinsics that were named, and the site and the trees of a
-// simulation.
+// outside its folder, and the metadata and extrinsics that were named. Of a simulation they are the
+// site and its trees.
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const std::string& recording,
                                                           const OpenOptions& options);
 

@@ -73,7 +73,7 @@ void CarriedReturns::add(const ScanPoint& point, std::uint32_t index) {
     voxel.products[k] += products[k];
 }
 
-void CarriedReturns::fade(Voxel& voxel) {
+void CarriedReturns::halve_sums(Voxel& voxel) {
   voxel.n *= 0.5F;
   for (float& sum : voxel.sum)
     sum *= 0.5F;
@@ -155,7 +155,7 @@ void CarriedReturns::learn(const Scan& scan, const Eigen::Vector3d& up_in_lidar)
       const bool ground = is_level(index, up_in_lidar) && !is_above_others(index, up_in_lidar);
       voxel.ground = ground ? 1 : 0;
       voxel.judged = scans_;
-      if (voxel.n >= kFullVoxel) fade(voxel);
+      if (voxel.n >= kFullVoxel) halve_sums(voxel);
     }
     if (voxel.ground != 0) voxel.carried = 0;
   }

@@ -21,10 +21,10 @@ void describe(ConfigTable& table, CarriedReturnsConfig& config);
 
 // Finds the returns that go along with the lidar. They say that it stands still, and to a scan with
 // few other things near by they say so louder than the world does. The space around the lidar is
-// divided into voxels of 0.2 m in its own frame. What has had returns from the first scan on, in
-// nearly all of the last 30 scans, counts as carried until the lidar has moved and the place is
-// empty. Level surfaces never count: ground looks the same from everywhere. One scan after another;
-// not thread-safe.
+// divided into voxels of 0.2 m in its own frame. A voxel counts as carried if it has had returns
+// from the first scan on, in nearly all of the last 30 scans. It does so until the lidar has moved
+// and the place is empty. Level surfaces never count: ground looks the same from everywhere. One
+// scan after another; not thread-safe.
 class CarriedReturns {
  public:
   explicit CarriedReturns(const CarriedReturnsConfig& config);
@@ -55,7 +55,7 @@ class CarriedReturns {
   [[nodiscard]] std::uint32_t voxel_of(const ScanPoint& point) const;
   void add(const ScanPoint& point, std::uint32_t voxel);
   // Half of its sums: what was there before counts for less.
-  static void fade(Voxel& voxel);
+  static void halve_sums(Voxel& voxel);
   // Its share as of the scan before `scan`, if no scan has hit it since `last`.
   [[nodiscard]] float share_before(const Voxel& voxel, std::uint32_t scan) const;
   [[nodiscard]] bool is_above_others(std::uint32_t voxel, const Eigen::Vector3d& up) const;

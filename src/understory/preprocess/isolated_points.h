@@ -10,8 +10,8 @@ namespace understory {
 
 // Which returns near the lidar stand alone: snow flakes, rain, insects, echoes out of nothing. What
 // falls around a moving lidar is measured where the lidar is. It holds matches back, since its
-// points of one scan meet those of the scan before (P3, F6 and the lessons below it: "even a light
-// snow fall will be visible in the map").
+// points of one scan meet those of the scan before. P3 says so in F6 and the lessons below it:
+// "even a light snow fall will be visible in the map".
 struct IsolatedPointsConfig {
   double within_m = 8.0;  // of the lidar; farther away thin stems give single points too; 0: none
   double gap_m = 0.25;    // to its neighbours on its ring, beyond which it is alone

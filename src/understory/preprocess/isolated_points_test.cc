@@ -48,7 +48,7 @@ TEST(IsolatedPoints, AFlakeBeforeAWallGoes) {
     EXPECT_EQ(keep[i], i == place(100, 2) ? 0 : 1) << i;
 }
 
-// The ends of a ring have one neighbour, a stem of two returns is company for itself, and what a
+// The ends of a ring have one neighbour, and a stem of two returns is company for itself. What a
 // box already took out stays out.
 TEST(IsolatedPoints, WhatHasCompanyStays) {
   Scan scan = round_wall();

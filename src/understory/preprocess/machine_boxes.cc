@@ -44,9 +44,8 @@ bool in_fixed_box(const MachineBox& box, const Eigen::Vector3d& point) {
   return (local.cwiseAbs().array() <= 0.5 * box.size_m.array()).all();
 }
 
-// The path of the point in the box as the joint goes through its range, one axis of the box:
-// constant + cosine * cos(value) + sine * sin(value) for a turn, constant + cosine * value for a
-// slide.
+// The path of the point in the box as the joint goes through its range, one axis of the box. A turn
+// gives constant + cosine * cos(value) + sine * sin(value), a slide constant + cosine * value.
 struct Path {
   double constant = 0.0;
   double cosine = 0.0;
@@ -103,8 +102,8 @@ void add_crossings(const MachineBox& box, const Path& path, double level,
   }
 }
 
-// Whether the point is inside at any value of the range: between two neighbouring crossings of the
-// planes of the box nothing changes, so it is enough to ask once in each interval.
+// Whether the point is inside at any value of the range. Between two neighbouring crossings of the
+// planes of the box nothing changes, so one question in each interval is enough.
 bool in_swept_box(const MachineBox& box, const Eigen::Vector3d& point) {
   const std::array<Path, 3> path = path_of(box, point);
   std::vector<double> values = {box.low, box.high};

@@ -10,8 +10,8 @@
 
 namespace understory {
 
-// A box around a part of the machine that carries the lidar, with at most one degree of freedom
-// (P4 section 3.3: body, cabin and boom of a harvester).
+// A box around a part of the machine that carries the lidar, with at most one degree of freedom. P4
+// section 3.3 has body, cabin and boom of a harvester.
 struct MachineBox {
   enum class Joint { kFixed, kRevolute, kPrismatic };
   enum class Frame { kBody, kLidar };
@@ -35,10 +35,10 @@ struct MachineBox {
   std::vector<Sample> series;  // sorted by stamp; linear between, held outside
 };
 
-// Reads `boxes:` from a YAML file; each entry: name, frame (body|lidar), center_m [x,y,z],
-// rotation_deg [roll,pitch,yaw], size_m [x,y,z], and optionally joint: {type: revolute|prismatic,
-// origin_m, axis, and one of value_deg|value_m, range_deg|range_m [low, high], series: file.csv}.
-// A series file has the header `timestamp,value` (seconds; degrees or metres), its path relative to
+// Reads `boxes:` from a YAML file. Each entry has name, frame (body|lidar), center_m [x,y,z],
+// rotation_deg [roll,pitch,yaw] and size_m [x,y,z]. It may have joint: {type: revolute|prismatic,
+// origin_m, axis, and one of value_deg|value_m, range_deg|range_m [low, high], series: file.csv}. A
+// series file has the header `timestamp,value` (seconds; degrees or metres), its path relative to
 // the YAML. All problems in one ConfigError; an unreadable series is an InputError.
 [[nodiscard]] std::vector<MachineBox> read_machine_boxes(const std::string& path);
 

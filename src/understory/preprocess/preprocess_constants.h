@@ -75,7 +75,7 @@ namespace weather_filter {  // preprocess/weather_filter.cc
 inline constexpr double kBrightShare = 0.9;
 // Added to brightness: a black return needs some distance too [tuned: as above]
 inline constexpr float kDarkest = 0.02F;
-// How far the lidar may have moved between a scan and those before it, metres; a return that is
+// How far the lidar may have moved between a scan and those before it, metres. A return that is
 // nearer than some times that is then looked for in vain [chosen: 5 m/s at 10 Hz]
 inline constexpr double kMovedM = 0.5;
 // Returns that a thread judges at a time [bound: time]

@@ -10,8 +10,8 @@
 
 namespace understory {
 
-// The points of a scan in cells that grow with the distance from the lidar, so that neighbours as
-// far as a share of that distance are found in constant time. Immutable, thread-safe.
+// The points of a scan in cells that grow with the distance from the lidar. Neighbours as far as a
+// share of that distance are then found in constant time. Immutable, thread-safe.
 class RangeGrid {
  public:
   static constexpr std::uint32_t kNoPoint = UINT32_MAX;

@@ -13,8 +13,8 @@
 
 namespace understory {
 
-// What is weather: flakes, snow off branches, spurious ranges of a cold lidar and of the low sun
-// (P3, figure 6 II and the lessons below it).
+// What is weather: flakes, snow off branches, and spurious ranges of a cold lidar and of the low
+// sun. P3 shows it in figure 6 II and the lessons below it.
 struct WeatherFilterConfig {
   bool enabled = false;
   // A return is weather where its distance from others, as a share of its range, is above this

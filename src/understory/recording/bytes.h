@@ -16,7 +16,7 @@ static_assert(std::endian::native == std::endian::little,
               "the readers copy little-endian numbers as they are");
 
 // Reads little-endian numbers from bytes that may be damaged. A read past the end returns zero and
-// makes `ok()` false for good, so that a record is decoded first and judged once at its end.
+// makes `ok()` false for good. A record is therefore decoded first and judged once at its end.
 class ByteReader {
  public:
   explicit ByteReader(ByteSpan bytes) : bytes_(bytes) {}

@@ -59,13 +59,12 @@ bool complete_rig(const TransformTree& tree, const SensorFrames& frames, Rig& ri
 //       - {topic: /front, body_from_lidar: {translation_m: [1, 0, 2]}, late_s: 0.03}
 //       - {topic: /rear, body_from_lidar: {translation_m: [-1, 0, 2], rpy_deg: [0, 0, 180]}}
 // A rotation is given as rotation_xyzw, rpy_deg (fixed axes x, y, z) or matrix (nine numbers, row
-// by row); without one it is none.
-// Without `body_frame`, or where that is the recording's body (`body_names` are other names of it),
-// the places are on the recording's body, and sensors that the file does not name stay where they
-// were. With another `body_frame` they move along: a sensor in the file whose place the recording
-// knows too leads from one body to the other. What cannot be moved is dropped, with a warning
-// ("recording.extrinsics_body"). Throws ConfigError with all that is wrong, and where nothing tells
-// the lidar's place; InputError if the file cannot be read.
+// by row); without one it is none. Without `body_frame`, or with the recording's body (`body_names`
+// are its other names), the places are on that body. Sensors that the file does not name then stay
+// where they were. With another `body_frame` they move along: a sensor in the file whose place the
+// recording knows too leads from one body to the other. What cannot be moved is dropped, with a
+// warning ("recording.extrinsics_body"). Throws ConfigError with all that is wrong, and where
+// nothing tells the lidar's place; InputError if the file cannot be read.
 void apply_extrinsics_file(const std::string& path, const std::vector<std::string>& body_names,
                            Rig& rig, Log& log, int lidar_entry = 0);
 

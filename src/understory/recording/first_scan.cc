@@ -26,8 +26,8 @@ void FinishedScans::add(ScanPtr scan, double missing) {
   any_ = true;
 }
 
-// A first scan that lasts as long as the next one is whole: the lidar's view is limited, and the
-// turn began where it sees nothing.
+// A first scan that lasts as long as the next one is whole. The lidar's view is limited then, and
+// the turn began where it sees nothing.
 void FinishedScans::settle_part(const Scan& next) {
   if (part_ == nullptr) return;
   const double usual = to_seconds(next.end() - next.stamp);

@@ -10,8 +10,8 @@
 
 namespace understory {
 
-// Finds out whether an IMU's gyroscope and accelerometer use the same axes: while the IMU tilts,
-// the direction of gravity turns against the angular rate, d up / dt = -omega x up. Each of the 48
+// Finds out whether an IMU's gyroscope and accelerometer use the same axes. While the IMU tilts,
+// the direction of gravity turns against the angular rate: d up / dt = -omega x up. Each of the 48
 // ways to take the gyroscope's axes is tried on windows of half a second. Constant memory. Not
 // thread-safe.
 class ImuAxisCheck {
@@ -21,8 +21,8 @@ class ImuAxisCheck {
   // "x y z" where the axes agree, "y -x z" and so on where another way fits far better. Empty if
   // there was too little tilting to tell.
   [[nodiscard]] std::string result() const;
-  // The factor by which angular rates have to be multiplied to fit the tilts, with the axes of
-  // `result`; 1 in a consistent IMU, 0.017 if they are in degrees. 0 if unknown.
+  // The factor that makes angular rates fit the tilts, with the axes of `result`. It is 1 in a
+  // consistent IMU, 0.017 if the rates are in degrees. 0 if unknown.
   [[nodiscard]] double rate_scale() const;
 
  private:

@@ -18,8 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kKnownKinds =
-    "expected an MCAP file, a ROS 1 bag, a ROS 2 bag (.db3 or folder), a PCAP capture, a cloud "
-    "(.pcd, .ply, .las, .laz, .bin) or a folder of clouds";
+    "expected MCAP, a ROS 1 bag, a ROS 2 bag (.db3 or folder), PCAP, a cloud (.pcd, .ply, .las, "
+    ".laz, .bin) or a folder of clouds";
 
 constexpr std::string_view kSqliteMagic = "SQLite format 3";
 constexpr std::string_view kZstdMagic = "\x28\xB5\x2F\xFD";

@@ -299,8 +299,8 @@ TEST_F(Places, AnotherRecordingIsRefused) {
   EXPECT_THROW(second->load(reader), InputError);
 }
 
-// Found by fuzzing: a channel that is described only behind a chunk is known when the chunk is read
-// again, and messages came that had been passed over.
+// Found by fuzzing: a channel was described only behind a chunk, so that it was known when the
+// chunk was read again. Messages came that had been passed over.
 TEST(MessageMerger, ABlockThatHoldsMoreThanBeforeIsNotGoneOnWith) {
   const auto block = [](std::size_t messages) {
     MessageBlock made;

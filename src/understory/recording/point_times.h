@@ -22,8 +22,8 @@ struct TimeConvention {
   Kind kind = Kind::kNone;
   double unit_s = 1e-9;              // 1, 1e-3, 1e-6 or 1e-9
   Stamp stamp = Stamp::kFirstPoint;  // where in the scan the header stamp lies
-  // How much later than the header stamp the point of offset zero really was; -duration of a scan
-  // where offsets count from the first point and the stamp is that of the last one.
+  // How much later than the header stamp the point of offset zero really was. It is minus a scan's
+  // duration where the stamp is that of the last point and offsets count from the first.
   TimeNs shift = 0;
   std::string text;     // for `info`: "offset in ns from the header stamp; stamp = first point"
   std::string warning;  // empty if there is nothing to worry about
@@ -43,9 +43,9 @@ struct CloudTimes {
 
 // Judges the first clouds of a topic together: unit, offset or absolute, and whether the header
 // stamp is the first or the last point. `imu_delays` are log time - stamp of IMU messages of the
-// same stretch: a scan whose last point would lie after its arrival (seen on the IMU's clock) has
-// the stamp of its last point. `field` and `type` name the time field ("t", "uint32"), empty if
-// there is none. Deterministic; any numbers are valid.
+// same stretch. If a scan's last point would lie after its arrival, seen on the IMU's clock, the
+// stamp is that point's. `field` and `type` name the time field ("t", "uint32"), empty if there is
+// none. Deterministic; any numbers are valid.
 [[nodiscard]] TimeConvention detect_point_times(const std::string& field, const std::string& type,
                                                 const std::vector<CloudTimes>& clouds,
                                                 const std::vector<TimeNs>& imu_delays);

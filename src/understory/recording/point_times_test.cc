@@ -18,8 +18,8 @@ using Stamp = TimeConvention::Stamp;
 
 constexpr TimeNs kPeriod = 100'000'000;
 
-// One way of writing the times of points: the value for a point measured `offset` ns after the
-// start of a scan that began at `start`.
+// One way of writing the times of points: the value for a point `offset` ns after the start of a
+// scan. The scan began at `start`.
 struct Style {
   const char* name;
   FieldType type;

@@ -94,10 +94,10 @@ struct OpenOptions {
   int lidar_entry = 0;          // of the file's list of lidars: that of the lidar that is read
 };
 
-// Opens a recording by what is in it, not by its name: MCAP, ROS 1 bag, ROS 2 .db3 (file or bag
-// folder), PCAP/PCAPNG, a folder of clouds, one cloud. Several lidars are merged (lidars/
-// merged_lidars.h). Throws InputError (exit code 3) if the file is missing, empty or of no known
-// kind.
+// Opens a recording by what is in it, not by its name. Kinds are MCAP, ROS 1 bag, ROS 2 .db3 (file
+// or bag folder), PCAP/PCAPNG, a folder of clouds, and one cloud. Several lidars are merged
+// (lidars/ merged_lidars.h). Throws InputError (exit code 3) if the file is missing, empty or of no
+// known kind.
 [[nodiscard]] std::unique_ptr<Recording> open_recording(const std::string& path,
                                                         const OpenOptions& options, Log& log);
 

@@ -24,8 +24,8 @@ inline constexpr double kShortestM = 0.1;
 inline constexpr std::size_t kLastDistances = 50;
 // Distances before the first heading [chosen: a median of fewer is chance]
 inline constexpr std::size_t kFewestDistances = 5;
-// Share of the antennas' distance by which a pair's may be off, and by which all may scatter: a
-// heading by chance is 20 degrees off there [chosen]
+// Most by which a pair's distance, and the scatter of all, may be off, as a share of the antennas'
+// distance. A heading by chance is 20 degrees off there [chosen]
 inline constexpr double kMostShare = 0.3;
 // Standard deviations beyond which a distance is wrong [chosen]
 inline constexpr double kFarDistance = 4.0;

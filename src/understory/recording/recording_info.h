@@ -43,7 +43,7 @@ struct RecordingInfo {
     Eigen::Vector3d up_in_body = Eigen::Vector3d::Zero();  // zero if the IMU's place is unknown
     bool has_orientation = false;
     // How the gyroscope's axes have to be taken for its turns to agree with the accelerometer's
-    // tilts, "x y z" where they agree as they are; empty if the motion does not tell.
+    // tilts. "x y z": they agree as they are; empty: the motion does not tell.
     std::string gyroscope_axes;
     TimeNs first = 0;
     TimeNs last = 0;
@@ -88,7 +88,7 @@ class RecordingSurvey {
 };
 
 // Sensors that the extrinsics put more than 10 m from the body's origin or from the lidar, in words
-// for the user: millimetres taken for metres, or a place on the earth.
+// for the user. Millimetres are then taken for metres, or a place on the earth is given.
 [[nodiscard]] std::vector<std::string> long_lever_arms(const Rig& rig);
 
 }  // namespace understory

@@ -14,11 +14,11 @@ CellBlocks::Block& CellBlocks::find_or_add(const Place& block) {
   blocks_.emplace_back().at = block;
   for (std::size_t step = 0; step < 27; ++step)
     blocks_[number].beside[step] = index_.find(key_of(neighbour(block, step)));
-  introduce(number);
+  link_neighbours(number);
   return blocks_.back();
 }
 
-void CellBlocks::introduce(std::uint32_t number) {
+void CellBlocks::link_neighbours(std::uint32_t number) {
   for (std::size_t step = 0; step < 27; ++step) {
     const std::uint32_t other = blocks_[number].beside[step];
     if (other != kNone) blocks_[other].beside[26 - step] = number;
@@ -36,7 +36,7 @@ void CellBlocks::remove(std::uint32_t number) {
     blocks_[number] = blocks_.back();
     index_.set(key_of(blocks_[number].at), number);
     blocks_[number].beside[kMiddle] = number;
-    introduce(number);
+    link_neighbours(number);
   }
   blocks_.pop_back();
 }

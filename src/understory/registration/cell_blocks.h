@@ -42,9 +42,9 @@ struct NearAlongAxis {
 };
 inline constexpr NearAlongAxis kNearAlongAxis;
 
-// Cells of a grid in blocks of 4 x 4 x 4, a bit each: which there are, which changed, and what lies
-// near them, without asking for every cell of a neighbourhood one by one. A neighbourhood is a cube
-// of cells, `reach` (0 to 4) to each side. What is near comes in an order that depends on places
+// Cells of a grid in blocks of 4 x 4 x 4, a bit each. They tell which cells there are, which
+// changed, and what lies near, without a question to each neighbour. A neighbourhood is a cube of
+// cells, `reach` (0 to 4) to each side. What is near comes in an order that depends on places
 // alone.
 class CellBlocks {
  public:
@@ -106,7 +106,7 @@ class CellBlocks {
   Block& find_or_add(const Place& block);
   void remove(std::uint32_t number);
   // Has the blocks beside one know its number.
-  void introduce(std::uint32_t number);
+  void link_neighbours(std::uint32_t number);
   // Blocks with a change in them or beside them.
   [[nodiscard]] const std::vector<std::uint32_t>& touched();
 

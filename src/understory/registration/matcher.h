@@ -93,8 +93,8 @@ class TargetBuilder {
   // Forgets what is farther than `radius_m` from a place (frame of the target).
   virtual void forget_beyond(const Eigen::Vector3d& centre, double radius_m) = 0;
   virtual void clear() = 0;
-  // Bytes that it and its last snapshot take, about: told by how much they hold, so that it is the
-  // same on every machine and after the same clouds.
+  // Bytes that it and its last snapshot take, about. They follow from how much both hold, so that
+  // all machines agree after the same clouds.
   [[nodiscard]] virtual double bytes() const = 0;
   // The target as it is now. Quickest if nobody holds the last one any more: its memory may then be
   // written on.

@@ -42,7 +42,7 @@ std::string matcher_summaries(const std::string& between) {
 
 void describe(ConfigTable& table, MatcherConfig& config) {
   table.add_choice("method", config.method, matcher_names(),
-                   "how points are matched: " + matcher_summaries());
+                   "how points are matched. " + matcher_summaries(". "));
   describe_settings(table, config);
 }
 

@@ -20,10 +20,10 @@ struct PoseBelief {
 // is the origin of the source; what position and attitude have in common is left out.
 [[nodiscard]] PoseBelief belief_of(const Pose& target_from_source, const Matrix6d& covariance);
 
-// The point of the source where a push moves it without turning it, metres, frame of the source:
-// of a match with this information of a right perturbation, rotation first. A position that is
-// believed there does not tilt a scan. Exact where the points hold it alike in all directions;
-// else the nearest that there is. The origin where nothing holds it.
+// The point of the source where a push moves it without turning it, metres, frame of the source.
+// `information` is that of a match, of a right perturbation, rotation first. A position that is
+// believed there does not tilt a scan. Exact where the points hold it alike in all directions; else
+// the nearest that there is. The origin where nothing holds it.
 [[nodiscard]] Eigen::Vector3d centre_of_turning(const Matrix6d& information);
 
 // How a belief enters a match.

@@ -78,8 +78,8 @@ TEST(Penalties, ThreePointsLieAtTheAntennaBelowItAndAhead) {
   EXPECT_NEAR(points[1].covariance(2, 2), 0.25, 1e-12);
 }
 
-// Alone, the direct form has its minimum at the belief, and its curvature is that of both
-// covariances: a displacement of the antenna and a turn about it.
+// Alone, the direct form has its minimum at the belief. Its curvature is that of both covariances:
+// a displacement of the antenna and a turn about it.
 TEST(Penalties, TheDirectFormHasTheCovariancesOfTheBelief) {
   const PoseBelief belief = some_belief();
   const PoseTerms terms = {penalty_term(belief, PenaltyForm::kDirect)};
@@ -150,8 +150,8 @@ struct Walk {
     return {-std::asin(ahead.z()),
             (estimate.translation() - Eigen::Vector3d(kSteps * kStepM, 0.0, 1.6)).norm()};
   }
-  // What is ahead looks higher the farther it is, and what is behind does not: over a few metres of
-  // way each scan seems to have pitched.
+  // What is ahead looks higher the farther it is, and what is behind does not. Over a few metres of
+  // way each scan then seems to have pitched.
   [[nodiscard]] static Points bent(Points points) {
     for (Eigen::Vector3f& p : points)
       p.z() += 0.004F * p.x() * std::abs(p.x()) / 5.0F;

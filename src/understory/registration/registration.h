@@ -73,8 +73,8 @@ struct RegistrationResult {
   // Mean squared distance of matched points from what they matched, P4 (36); lower is better. NDT:
   // from the mean of the nearest cell; ICP: from the nearest target point.
   double fitness_m2 = 0.0;
-  // The same along the directions that the target's surface constrains (point to plane); 0 for a
-  // perfect match, unlike fitness_m2, which never falls below the spacing of the target.
+  // The same along the directions that the target's surface constrains (point to plane). 0 for a
+  // perfect match, while fitness_m2 never falls below the spacing of the target.
   double surface_residual_m2 = 0.0;
   double inlier_ratio = 0.0;  // share of source points with a match, 0..1
   int iterations = 0;

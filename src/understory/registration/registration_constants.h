@@ -27,8 +27,8 @@ inline constexpr double kOneSide = 0.9;
 // Sine of the angle between a surface and the rays: smaller, the rays lie in it [chosen; measured
 // on harvester seeds 3 and 11, docs/method/registration.md]
 inline constexpr double kGrazing = 0.1;
-// Variance of a surface's second axis over that of a full cell: smaller, the surface is a strip,
-// whose slope across is told by its surroundings [chosen]
+// Variance of a surface's second axis over that of a full cell. Below it the surface is a strip,
+// and its surroundings tell its slope across [chosen]
 inline constexpr double kStripShare = 0.5;
 // Squared floors of sigma added to the limit of a line [chosen]
 inline constexpr double kLineNoise = 1.0;

@@ -23,7 +23,7 @@ Vector6d scale_of(double range_m) {
 }
 
 // Solves H step = -g in the basis of H's eigenvectors, so that indefinite and singular Hessians
-// need no special case: negative curvature is turned round, none at all gives no step.
+// need no special case. Negative curvature changes its sign, and none gives no step.
 Vector6d newton_step(const PoseCost& at, const Vector6d& scale) {
   const Matrix6d hessian = scale.asDiagonal() * at.hessian * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(hessian);

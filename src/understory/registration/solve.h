@@ -30,8 +30,8 @@ struct Minimum {
 
 // Newton steps to where the gradient vanishes; a step that runs far past that point is halved. The
 // slope decides and not the cost, because the cost also counts how many points meet any cell at
-// all. Over smooth ground that is most where the rings of one scan lie on the rings of the other,
-// and steps away from there would be refused. Directions without any information are not moved
+// all. Over smooth ground that is most where the rings of one scan lie on the rings of the other.
+// The cost would refuse steps away from there. Directions without any information are not moved
 // along.
 [[nodiscard]] Minimum minimise(const Evaluate& evaluate, const Pose& guess,
                                const StepLimits& limits);

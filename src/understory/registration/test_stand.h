@@ -8,8 +8,8 @@
 
 namespace understory::testing {
 
-// A small stand for tests and benchmarks of matching, seen by analytic ray casting: rolling ground,
-// stems as (leaning) cylinders, crowns and bushes as balls in which a ray is stopped by chance.
+// A small stand for tests and benchmarks of matching, seen by analytic ray casting. It has rolling
+// ground, stems as (leaning) cylinders, and crowns and bushes as balls that stop rays by chance.
 struct Stem {
   Eigen::Vector3d foot = Eigen::Vector3d::Zero();
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();

@@ -6,7 +6,7 @@
 
 namespace understory {
 
-// A number that is the same for scans with the same points and, but for chance, for no others: a
+// A number that is the same for scans with the same points and, but for chance, for no others. A
 // lidar's noise never gives the same scan twice. Every eighth point is looked at. 0: no points.
 [[nodiscard]] std::uint64_t content_of(const Scan& scan);
 

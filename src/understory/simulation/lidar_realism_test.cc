@@ -83,8 +83,8 @@ TEST(LidarRealism, SnowFlakesFillTheAirNearTheSensor) {
   EXPECT_NEAR(static_cast<double>(heavy) / static_cast<double>(light), 4.0, 0.5);
 }
 
-// On level ground h below, a beam of elevation e that looks higher by b has the range
-// h / sin(-(e + b)), and says that it looks along e.
+// On level ground h below, a beam of elevation e that looks higher by b has the range h / sin(-(e +
+// b)). Its point says that it looks along e.
 TEST(LidarRealism, AnElevationBiasMovesRangesAndNotTheDirectionsThatAreTold) {
   const auto ranges = [](double bias_deg) {
     std::vector<double> found;

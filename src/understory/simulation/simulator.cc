@@ -399,7 +399,7 @@ const std::optional<GnssFix>& Simulator::second_fix() const {
   return impl_->second_fix;
 }
 
-void Simulator::tell_points(std::function<void(const std::vector<TruePoint>&)> sink) {
+void Simulator::set_point_sink(std::function<void(const std::vector<TruePoint>&)> sink) {
   UNDERSTORY_CHECK(!impl_->cache);
   impl_->scanner.keep_sources();
   impl_->point_sink = std::move(sink);

@@ -17,9 +17,9 @@ namespace understory {
 // all cases.
 enum class SimulatedLidars { kFirst, kSecond, kBoth };
 
-// A forest that is scanned while one reads: events in the order of their time (a scan's is its
-// nominal end), made when they are asked for. The same site and seed give the same bytes, whatever
-// the number of threads. Not thread-safe; casting a scan uses the current task arena.
+// A forest that is scanned while one reads. Events come in the order of their time (a scan's is its
+// nominal end), made on request. The same site and seed give the same bytes, whatever the number of
+// threads. Not thread-safe; casting a scan uses the current task arena.
 class Simulator : public Recording {
  public:
   explicit Simulator(const SiteConfig& config);
@@ -50,7 +50,7 @@ class Simulator : public Recording {
 
   // From now on hands over the points of each scan that is cast, at their true places. Not
   // together with a folder of casts, which does not keep what gave an echo.
-  void tell_points(std::function<void(const std::vector<TruePoint>&)> sink);
+  void set_point_sink(std::function<void(const std::vector<TruePoint>&)> sink);
 
   [[nodiscard]] const SiteConfig& site() const;
   [[nodiscard]] double duration_s() const;

@@ -327,9 +327,9 @@ void describe(ConfigTable& table, SiteConfig& config);
 // where it is the usual one. The site.yaml of a truth has these keys.
 void describe_used(ConfigTable& table, SiteConfig& config);
 
-// Names all of a site that its scans depend on, for the cache of scans, with the content of its
-// list of trees and of their clouds. IMU, GNSS, magnetometer, total station and what is wrong with
-// the lidar's clock and claimed place are not among them.
+// A key of all of a site that its scans depend on, with the content of its list of trees and of
+// their clouds. It names entries of the cache of scans. IMU, GNSS, magnetometer, total station and
+// what is wrong with the lidar's clock and claimed place are not among them.
 [[nodiscard]] std::uint64_t site_key(const SiteConfig& config);
 
 // A site that the program carries with it.

@@ -44,8 +44,8 @@ template <typename Sum, typename Accumulate>
   return total;
 }
 
-// Runs `work` in a task arena of exactly `threads` threads (at least 1; 0 = all of the machine), so
-// that every parallel call inside uses no more than that.
+// Runs `work` in a task arena of exactly `threads` threads (at least 1; 0 = all of the machine). No
+// parallel call inside uses more than that.
 void with_threads(int threads, const std::function<void()>& work);
 
 // Runs `work` in an arena of its own of `threads` threads, within the limit of the process: for

@@ -26,7 +26,7 @@ class Random {
 };
 
 // A well-mixed 64-bit hash of three numbers: a random number that depends on nothing but its key
-// (counter-based), for noise that must not depend on the order of work.
+// (counter-based). It is for noise that must not depend on the order of work.
 [[nodiscard]] std::uint64_t hash_numbers(std::uint64_t a, std::uint64_t b = 0, std::uint64_t c = 0);
 
 }  // namespace understory

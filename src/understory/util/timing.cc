@@ -44,7 +44,7 @@ double resident_memory_mb() {
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
-void give_back_what_is_freed() {
+void return_freed_memory_sooner() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
   mallopt(M_TRIM_THRESHOLD, 8 << 20);
@@ -53,7 +53,7 @@ void give_back_what_is_freed() {
 #endif
 }
 
-void give_free_memory_back() {
+void return_freed_memory() {
 #ifdef __GLIBC__
   malloc_trim(0);
 #endif

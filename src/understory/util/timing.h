@@ -19,9 +19,9 @@ namespace understory {
 [[nodiscard]] double resident_memory_mb();
 // Hands memory that has been freed back to the system where the C library would keep it. For the
 // end of a stage that needed much: it takes some milliseconds.
-void give_free_memory_back();
+void return_freed_memory();
 // From now on what is freed goes back sooner, for a few per cent of the time.
-void give_back_what_is_freed();
+void return_freed_memory_sooner();
 
 // Mean, percentiles (nearest rank) and largest of a set of values; zeros for an empty set.
 struct Distribution {
@@ -34,8 +34,8 @@ struct Distribution {
 [[nodiscard]] Distribution distribution_of(std::vector<double> values);
 
 // Wall and CPU milliseconds of each run of each named stage. Thread-safe. Values are kept as
-// floats: memory does not grow over a working day because each stage keeps at most 65,536 of them,
-// thinned evenly once it is full.
+// floats. Memory does not grow over a working day: each stage keeps at most 65,536 of them, thinned
+// evenly once it is full.
 class StageTimes {
  public:
   struct Sample {
@@ -58,8 +58,8 @@ class StageTimes {
   std::map<std::string, Series> series_;
 };
 
-// CPU time of work that runs beside the scan loop on a thread of its own, counted while it runs:
-// what the process used less this is what the loop used. One thread at a time may work; any may
+// CPU time of work that runs beside the scan loop on a thread of its own, counted while it runs.
+// What the process used less this is what the loop used. One thread at a time may work; any may
 // read.
 class SideWork {
  public:

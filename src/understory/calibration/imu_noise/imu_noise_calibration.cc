@@ -66,7 +66,7 @@ void ImuNoiseCalibration::add(const ImuSample& sample) {
     deviations_[static_cast<std::size_t>(i)].add(value[i]);
 }
 
-std::string ImuNoiseCalibration::where_it_stood(TimeNs origin) const {
+std::string ImuNoiseCalibration::standstill_text(TimeNs origin) const {
   std::vector<StandingStretch> stretches = watch_.stretches();
   if (stretches.empty()) return "it stood at no time";
   const auto longest =
@@ -94,7 +94,7 @@ ImuNoiseResult ImuNoiseCalibration::result(TimeNs origin) const {
     return refuse(
         ImuNoiseProblem::kMoves,
         fmt::format("expected an IMU that stands still without a gap for all {:.1f} s; {}",
-                    duration, where_it_stood(origin)));
+                    duration, standstill_text(origin)));
   if (duration < kShortestS)
     return refuse(ImuNoiseProblem::kTooShort,
                   fmt::format("expected at least {:.0f} s of standing, and hours for the "

@@ -55,7 +55,7 @@ class ImuNoiseCalibration {
   [[nodiscard]] ImuNoiseResult result(TimeNs origin) const;
 
  private:
-  [[nodiscard]] std::string where_it_stood(TimeNs origin) const;
+  [[nodiscard]] std::string standstill_text(TimeNs origin) const;
 
   std::array<AllanDeviation, 6> deviations_;  // gyroscope, accelerometer
   StandingWatch watch_;

@@ -43,8 +43,8 @@ Variances variances_of(const std::vector<AllanPoint>& curve, double duration_s) 
   return all;
 }
 
-// The squares of the figures. Each round multiplies them by the root of how much the likelihood
-// asks for more over how much it asks for less: the likelihood grows, and none becomes negative.
+// The squares of the figures. Each round multiplies them by a root: how much the likelihood asks
+// for more, over how much it asks for less. The likelihood grows, and none becomes negative.
 Eigen::Vector3d likeliest_squares(const Variances& all) {
   Eigen::Vector3d squares;
   for (int k = 0; k < 3; ++k)
@@ -71,8 +71,8 @@ double passed(double frequency, double time_s) {
   return 2.0 * std::pow(std::sin(x), 4.0) / (x * x);
 }
 
-// Covariance of the measured variances where the squares are the true ones: of means of products of
-// Gaussian signals, which is the integral over the product of their spectra.
+// Covariance of the measured variances where the squares are the true ones. They are means of
+// products of Gaussian signals, so it is the integral over the product of their spectra.
 Eigen::MatrixXd covariance_of(const Variances& all, const Eigen::Vector3d& squares,
                               double duration_s) {
   const Eigen::Index count = all.times.size();

@@ -27,13 +27,13 @@ struct ClockCheckResult {
 
 // Looks at every run whether the turns that scan matching finds are those of the gyroscope, at the
 // same times and about the same axes. The fit is that of `calibrate_lidar_imu` without the
-// accelerometer, linear about the given place and clock. Unlike there the scans are deskewed by the
-// IMU: what they tell are then turns from the middle of one scan to that of the next. It keeps the
-// four stretches of 250 steps that tell the most, and changes nothing. Not thread-safe.
+// accelerometer, linear about the given place and clock. Unlike there, the scans are deskewed by
+// the IMU. Their turns then lead from the middle of one scan to that of the next. It keeps the four
+// stretches of 250 steps that tell the most, and changes nothing. Not thread-safe.
 class LidarImuClockCheck {
  public:
-  // What the matches tell of a turn: all of it, or the turn about up alone, as matches of stems do
-  // whose tilt is that of the IMU. These tell the lateness, and no turn of the axes.
+  // What the matches tell of a turn: all of it, or the turn about up alone. Matches of stems whose
+  // tilt is that of the IMU tell the latter. These tell the lateness, and no turn of the axes.
   enum class Turns { kAll, kAboutUp };
   // `noise`: limits of the samples.
   LidarImuClockCheck() : LidarImuClockCheck(ImuNoiseConfig()) {}
@@ -42,8 +42,8 @@ class LidarImuClockCheck {
 
   // In order of time.
   void add_sample(const ImuSample& sample);
-  // A scan as it was matched, without what the IMU says of its place: attitude of the body at its
-  // stamp, and the time of its last point.
+  // A scan as it was matched, without what the IMU says of its place. Takes the attitude of the
+  // body at its stamp, and the time of its last point.
   void add_scan(TimeNs stamp, TimeNs end, const Eigen::Quaterniond& world_from_body,
                 const Eigen::Quaterniond& body_from_imu);
   // The world of the scans to come is another one than that of the scans before.

@@ -11,7 +11,7 @@ struct NormalEquations {
 };
 
 // Adds a sequence of residuals of three axes, or of one, whose errors are correlated over time by a
-// law that nobody knows: errors of scan matching swing with gait and turns, and those of
+// law that nobody knows. Errors of scan matching swing with gait and turns, and those of
 // neighbouring differences cancel. Residuals and derivatives are taken apart into frequencies.
 // Errors of different frequencies are nearly independent, and their variance is that of the
 // residuals at the frequencies around (Hannan 1963). At least 20 residuals of each axis.

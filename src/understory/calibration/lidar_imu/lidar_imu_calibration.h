@@ -29,9 +29,9 @@ struct LidarImuResult {
 // was found without the IMU, and the IMU's samples. Turns about two axes tell the rotation and the
 // place, and any motion tells the lateness. Batch fit of gyroscope and accelerometer to the path,
 // P2 (3-4), with errors correlated over time. `given` is where the search begins (rotation within
-// 60 degrees, lateness within 0.3 s), and what stays where the motion tells nothing: directions in
-// which the standard deviation is above 1 degree, 0.1 m or 5 ms. At least 10 s of path with
-// samples, or the result has a problem.
+// 60 degrees, lateness within 0.3 s). It stays where the motion tells nothing: along directions
+// with a standard deviation above 1 degree, 0.1 m or 5 ms. At least 10 s of path with samples, or
+// the result has a problem.
 [[nodiscard]] LidarImuResult calibrate_lidar_imu(const std::vector<StampedPose>& world_from_lidar,
                                                  const ImuBuffer& imu, const Pose& given,
                                                  double given_late_s);

@@ -26,7 +26,7 @@ struct OnlineImuEstimate {
 
 // Refines place and clock of an IMU while a run goes on. Windows of 20 s are handed to
 // `calibrate_lidar_imu`, one after the other, and what they tell is joined by their covariances.
-// The scans are deskewed by the IMU: an error of its clock moves their first points and not their
+// The scans are deskewed by the IMU. An error of its clock moves their first points and not their
 // middles, so the path of the middles is taken. Its errors hardly depend on the IMU then. Memory is
 // bounded by a window. Not thread-safe; deterministic.
 class OnlineImuCalibration {

@@ -9,8 +9,8 @@
 
 namespace understory {
 
-// What is fitted: how the IMU sits on the lidar and by how much its clock is late, and what the
-// IMU and the path's frame add of their own.
+// What is fitted: how the IMU sits on the lidar, and by how much its clock is late. Also the errors
+// that the IMU and the path's frame add.
 struct LidarImuState {
   Pose lidar_from_imu;
   double imu_late_s = 0.0;  // the IMU's stamp less that of the lidar, for one moment
@@ -20,23 +20,23 @@ struct LidarImuState {
   // What scale and axes of the sensors are off by: the true value is (1 + error) times the sample.
   Eigen::Matrix3d gyro_axes = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d accel_axes = Eigen::Matrix3d::Zero();
-  // By how much the path is off where the motion within a scan bends: times the cube of the step
-  // between scans and the third derivative of attitude and place. To a swing that looks like a
-  // lateness which grows with the square of its frequency.
+  // By how much the path is off where the motion within a scan bends. It is multiplied by the cube
+  // of the step between scans and the third derivative of attitude and place. To a swing that looks
+  // like a lateness which grows with the square of its frequency.
   double turn_bend = 0.0;
   double place_bend = 0.0;
 };
 
-// Order of a step: rotation (3, right perturbation, in the frame of the IMU) and place (3, in the
-// frame of the lidar) of the IMU, lateness (1), biases (3 + 3), gravity (3), errors of the axes
-// (9 + 9, column by column), bends (1 + 1). Radians, metres, seconds.
+// Order of a step of the IMU: rotation (3, right perturbation, in its frame), place (3, in the
+// frame of the lidar), and lateness (1). Then biases (3 + 3), gravity (3), errors of the axes (9 +
+// 9, column by column), and bends (1 + 1). Radians, metres, seconds.
 inline constexpr Eigen::Index kLidarImuParameters = 36;
 inline constexpr Eigen::Index kLatenessParameter = 6;
 using LidarImuStep = Eigen::Matrix<double, kLidarImuParameters, 1>;
 using LidarImuMatrix = Eigen::Matrix<double, kLidarImuParameters, kLidarImuParameters>;
 [[nodiscard]] LidarImuState stepped(const LidarImuState& state, const LidarImuStep& step);
 
-// By how much path and IMU differ at one scan after the other: of three axes, rows 3 k to 3 k + 2
+// By how much path and IMU differ at one scan after the other. Of three axes, rows 3 k to 3 k + 2
 // are those of scan k; of one axis row k is.
 struct PathResiduals {
   Eigen::VectorXd values;
@@ -53,11 +53,11 @@ using PathRun = std::vector<StampedPose>;
                                                  const ImuBuffer& imu, double imu_late_s,
                                                  double latest_s);
 
-// Turns from scan to scan: the rotation vector from what the gyroscope says, P2 (3), to what the
-// path says, in the frame of the IMU, radians. One for each step of the run.
-// Velocities from step to step, in the frame of the path, m/s: P2 (4) with the velocity eliminated.
-// It is the change of the IMU's mean velocity from one step of the path to the next. What gravity
-// and accelerometer make of it is taken off. One for each pair of steps. With derivatives, found
+// Turns from scan to scan, in the frame of the IMU, radians. Each is the rotation vector from what
+// the gyroscope says, P2 (3), to what the path says. One for each step of the run. Velocities from
+// step to step, in the frame of the path, m/s: P2 (4) with the velocity eliminated. It is the
+// change of the IMU's mean velocity from one step of the path to the next. What gravity and
+// accelerometer make of it is taken off. One for each pair of steps. With derivatives, found
 // numerically. Throws InternalError where the IMU does not cover the run at the state's lateness.
 struct LidarImuResiduals {
   PathResiduals turns;

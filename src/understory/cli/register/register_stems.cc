@@ -45,7 +45,7 @@ void print_line(const std::string& name, const Json& value) {
   }
 }
 
-// P0 (26): ICP that has not come home leaves pairs about half a neighbour's distance apart; and the
+// P0 (26): ICP that has not come home leaves pairs about half a neighbour's distance apart. The
 // best of a range in which there is no match has as few partners.
 constexpr double kLeastOverlap = 0.4;
 

@@ -85,8 +85,8 @@ struct TreeChanges {
   IncrementSummary volume;
   // Thicker than this a tree cannot have grown in since OLD; NaN: too few diameters tell it.
   double ingrowth_limit_m = Tree::kUnknown;
-  // Share of the trees above that limit that OLD missed, and by it the number of trees that NEW
-  // missed among the gone, with its standard deviation: both scans are taken to miss alike.
+  // Share of the trees above that limit that OLD missed. From it follows the number of trees that
+  // NEW missed among the gone, with its standard deviation: both scans are taken to miss alike.
   double missed_share = Tree::kUnknown;
   double expected_missed = Tree::kUnknown;
   double expected_missed_sd = Tree::kUnknown;

@@ -13,7 +13,7 @@ namespace understory {
 [[nodiscard]] std::string diameter_complaint(const std::vector<Tree>& trees);
 
 // By what factor the diameters of B differ from those of A over pairs of one tree, in words for the
-// user: another unit, or radii. Empty: they agree, or too few pairs have both.
+// user. Another unit or radii cause it. Empty: they agree, or too few pairs have both.
 [[nodiscard]] std::string diameter_complaint(const std::vector<Tree>& a, const std::vector<Tree>& b,
                                              const std::vector<TreePair>& pairs);
 

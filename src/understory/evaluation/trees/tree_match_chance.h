@@ -12,14 +12,14 @@
 namespace understory {
 
 // Whether two tree maps that were merged show the same trees, or trees that lie near each other by
-// chance: in a stand of 1,000 trees per hectare most places have a tree within 1.5 m.
+// chance. In a stand of 1,000 trees per hectare most places have a tree within 1.5 m.
 struct MatchChance {
   std::size_t pairs = 0;  // trees that were found in both
   // Weight of the pairs: sum of 1 - d^2 / r^2, d their distance before they were joined, r the
   // largest one.
   double weight = 0.0;
   // The same for copies of the second map that keep its density and its extent, but no place of a
-  // tree: mean and standard deviation over the copies.
+  // tree. Mean and standard deviation are over the copies.
   int copies = 0;
   double chance_weight = 0.0;
   double chance_sd = 0.0;

@@ -20,8 +20,8 @@ using TreePair = std::pair<std::size_t, std::size_t>;
 // How two lists are matched at best.
 struct TreeAssignmentConfig {
   double radius_m = 0.5;  // farther trees are not the same, in the plane
-  // Diameters that differ by this share of the larger one count as much as a whole radius, and
-  // larger differences as much as that: a diameter chooses among near trees and excludes none.
+  // Diameters that differ by this share of the larger one count as much as a whole radius; larger
+  // differences count no more. A diameter chooses among near trees and excludes none.
   double diameter_share = 0.3;
   std::size_t most_pairs = 20'000'000;  // within the radius, 16 bytes each
 };

@@ -6,8 +6,8 @@
 
 namespace understory {
 
-// A cloth under a terrain, hanging upwards (the cloud turned upside down): it rises until it meets
-// the lowest points, and its stiffness carries it under what stands on the ground.
+// A cloth under a terrain, in a cloud turned upside down. It rises until it meets the lowest
+// points, and its stiffness carries it under what stands on the ground.
 struct ClothConfig {
   int stiffness = 2;
   int steps = 500;

@@ -108,8 +108,8 @@ std::vector<char> cells_around_known(const Raster& grid, int rings) {
   return around;
 }
 
-// Heights of the `wanted` cells from the known ones around, ring by ring until none is left: the
-// mean of a plane's worth of neighbours weighted by distance. Then a light smoothing of the filled
+// Heights of the `wanted` cells from the known ones around, ring by ring until none is left. Each
+// is the mean of its eight neighbours, weighted by distance. Then a light smoothing of the filled
 // cells only, for gaps of `rings` cells. `no_higher`: the lowest return of cells that have no
 // ground, NaN elsewhere.
 void fill_gaps(Raster& grid, int rings, const std::vector<char>& wanted,
@@ -163,8 +163,8 @@ void fill_gaps(Raster& grid, int rings, const std::vector<char>& wanted,
     sweep(false);
 }
 
-// Ground heights that stick out of the plane through their neighbours (a stump, a low branch that
-// the cloth touched) are dropped: robust local planes over 5 x 5 cells, only upwards.
+// Drops ground heights above the plane through their neighbours, such as a stump or a low branch
+// that the cloth touched. The planes are robust and local, over 5 x 5 cells.
 void drop_bumps(Raster& grid, float most) {
   const std::vector<float> values = grid.values;
   parallel_for(static_cast<std::size_t>(grid.rows), 16, [&](std::size_t r) {

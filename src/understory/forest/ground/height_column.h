@@ -7,7 +7,7 @@
 namespace understory {
 
 // How many points stand over a place, by metres above the ground. Ghosts of other pulses may fill
-// the sky, thinner and thinner with height, far fewer than a crown has: a top is where the points
+// the sky, far fewer than the points of a crown, and thinner with height. A top is where the points
 // suddenly become few.
 struct HeightColumn {
   static constexpr int kMetres = 64;  // the last one: and above

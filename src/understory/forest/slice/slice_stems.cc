@@ -51,8 +51,8 @@ StemFitResult start_of(const Circle& circle) {
   return start;
 }
 
-// Whether a straight line suits the points on the surface as well as the circle, or the outline
-// goes on beside it: a wall, a buttress.
+// Whether a straight line suits the points on the surface as well as the circle does, or the
+// outline goes on beside it. Then it is a wall or a buttress.
 bool is_piece_of_outline(const std::vector<SlicePoint>& points, const StemFitResult& fit) {
   if (fit.stem.arc_deg > kWallArcDeg) return false;
   const StemAxis axis(fit.stem);

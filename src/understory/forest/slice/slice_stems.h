@@ -16,7 +16,7 @@ struct SliceStem {
 };
 
 // Stems among the points of one thin cut. Their heights are not looked at, and are set to breast
-// height. A stem is a circle with an empty inside: one cut cannot tell a stem from a round bush, so
+// height. A stem is a circle with an empty inside. One cut cannot tell a stem from a round bush, so
 // less is tested than in `detect_stems`. The diameter is that of a noisy cylinder (see
 // noisy_cylinder.h). Deterministic for any number of threads; sorted by x, then y. Polls
 // `progress`.

@@ -9,9 +9,9 @@
 
 namespace understory {
 
-// Gathers points near breast height, one per small cube (their mean, with the number of returns),
-// so that memory goes with the surface seen, not with the number of returns. The order of points
-// changes nothing.
+// Gathers points near breast height, one for each small cube: their mean, and the number of
+// returns. Memory then grows with the surface seen, not with the number of returns. The order of
+// points changes nothing.
 class SliceThinner {
  public:
   // A cube of less than 1 mm counts as one of 1 mm.

@@ -61,8 +61,8 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
-// A quantile of d / sqrt(h - 1.3) = a + b d over the full heights, so that most trees are lower: a
-// start that hidden tops do not pull down (Koenker and Bassett, Econometrica 46, 1978).
+// A quantile of d / sqrt(h - 1.3) = a + b d over the full heights (Koenker and Bassett,
+// Econometrica 46, 1978). Most trees are lower, so hidden tops do not pull this start down.
 HeightCurve start_of(const std::vector<TreeOnCurve>& trees) {
   HeightCurve curve;
   double scale = 0.0;

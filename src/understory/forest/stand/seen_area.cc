@@ -35,8 +35,8 @@ struct Cells {
   }
 };
 
-// Sums along a line of cells. Entry c is how many of the cells before column c - `margin` hold
-// anything, so that every stretch within `margin` of the line is a difference of two entries.
+// Sums along a line of cells. Entry c counts the cells before column c - `margin` that hold
+// anything. A stretch within `margin` of the line is then a difference of two entries.
 void sum_line(const Cells& cells, int row, int margin, std::vector<int>& sums) {
   sums.assign(static_cast<std::size_t>(cells.columns + 2 * margin + 1), 0);
   int held = 0;
@@ -110,8 +110,8 @@ Cells counted_around(const Cells& cells, std::uint8_t least) {
   return squares;
 }
 
-// How far one sees in each direction from a place: to the far side of the nearest stem, so that a
-// stem does not hide itself.
+// How far one sees in each direction from a place: to the far side of the nearest stem. So a stem
+// does not hide itself.
 class Look {
  public:
   Look(const Eigen::Vector2d& from, const std::vector<StemDisc>& stems, double reach_m)

@@ -47,8 +47,8 @@ struct SeenFrom {
 
 // The area in which stems could be seen, as cells in the frame of the stand. A tree counts for a
 // figure by hectare if the cell of its foot was seen, and the same cells are the denominator. What
-// is hidden behind stems is in neither, so that the figure has no bias where trees stand
-// independently of each other (Campbell and Mecke's formula).
+// is hidden behind stems is in neither. The figure then has no bias where trees stand independently
+// of each other (Campbell and Mecke's formula).
 struct VisibleArea {
   double x0 = 0.0;  // western edge, metres
   double y0 = 0.0;  // southern edge

@@ -33,8 +33,8 @@ double basal_area_sd_m2(const StandTree& tree) {
   return 0.5 * M_PI * tree.dbh_m.value * tree.dbh_m.sd;
 }
 
-// The diameter as it counts in a mean weighted by basal area: the mean of the cube of a noisy
-// diameter is too large by three times it and the square of its error.
+// The diameter as it counts in a mean weighted by basal area. The mean cube of a noisy diameter is
+// too large by three times it and the square of its error.
 double weighted_dbh_m(const StandTree& tree) {
   const double d2 = squared(tree.dbh_m.value);
   const double cube_by_d = std::max(0.25 * d2, d2 - 3.0 * squared(tree.dbh_m.sd));

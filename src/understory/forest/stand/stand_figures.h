@@ -52,9 +52,10 @@ struct FiguresConfig {
 
 // The denominator is what was seen of the plot, and what was not seen is taken to be like it. The
 // square of a diameter is less the square of its standard deviation, as a noisy diameter is too
-// large in the square. Standard deviations hold the errors of diameters, heights and volumes, of
-// trees at the border whose place is not certain, of trees that were missed, and of what was not
-// seen. `plot`: in the frame of the trees; without rings it is everything that was seen.
+// large in the square. Standard deviations hold the errors of diameters, heights and volumes, and
+// the trees at the border whose place is not certain. They also hold the trees that were missed,
+// and the area that was not seen. `plot`: in the frame of the trees; without rings it is everything
+// that was seen.
 [[nodiscard]] StandFigures stand_figures(const StandTrees& stand, const VisibleArea& seen,
                                          const PlotShape& plot, const FiguresConfig& config);
 

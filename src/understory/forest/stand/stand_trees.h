@@ -42,11 +42,11 @@ struct StandTrees {
   double form_factor = std::numeric_limits<double>::quiet_NaN();
 };
 
-// A height that was not seen is that of the height curve. That of a lower bound, or of a height too
-// far below the curve to be one, is the expected one about the curve above it. Without a curve the
-// bound itself counts, and the volume up to it: figures of such trees are lower bounds. A stem
-// without a volume has basal area times height times the form factor: the sum of the known volumes
-// over that of the products. Where neither is known, the value stays NaN.
+// A height that was not seen is that of the height curve. A lower bound, or a height too far below
+// the curve to be one, becomes the height expected above it by the curve. Without a curve the bound
+// itself counts, and the volume up to it: figures of such trees are lower bounds. A stem without a
+// volume has basal area times height times the form factor: the sum of the known volumes over that
+// of the products. Where neither is known, the value stays NaN.
 [[nodiscard]] StandTrees stand_trees(const std::vector<Tree>& trees,
                                      const StandTableConfig& config);
 

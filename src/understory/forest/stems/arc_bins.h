@@ -31,8 +31,8 @@ class ArcBins {
   }
 
   // The arc over which the points would spread if they lay evenly: (sum n)^2 / sum n^2 steps. A
-  // large circle that merely passes through a small stem has a wide arc that is covered by strays,
-  // but nearly all of its points in one place.
+  // large circle may merely pass through a small stem. It has a wide arc covered by strays, but
+  // nearly all of its points in one place.
   [[nodiscard]] double even_deg() const {
     double sum = 0.0;
     double squares = 0.0;

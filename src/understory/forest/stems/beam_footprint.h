@@ -34,16 +34,16 @@ struct BeamFootprint {
 // Of beams that come from `range_m` away; nothing where the range or the beams are not known (0).
 [[nodiscard]] BeamFootprint footprint_at(const BeamConfig& config, double range_m);
 
-// From how far away a place was seen from `scanner` (where the scanner was, metres, the frame of
-// the place), on average over the returns, whose number falls with the square of the distance. What
-// stands in between is not looked at. 0 without places.
+// Mean range from which a place was seen, over the returns, whose number falls with the square of
+// the distance. `scanner`: places of the scanner, metres, in the frame of the place. What stands in
+// between is not looked at. 0 without places.
 [[nodiscard]] double mean_range_to(const std::vector<Eigen::Vector3d>& scanner,
                                    const Eigen::Vector3d& place);
 
 // By how much half of the width over which a stem's returns are spread exceeds its radius, metres;
 // negative where it is smaller. A beam that hits the edge with a part of its footprint still gives
-// an echo, and the point is put on the middle of the beam: beside the stem. A part that is too
-// small, or that meets the bark too steeply, gives none.
+// an echo. The point is put on the middle of the beam: beside the stem. A part that is too small,
+// or that meets the bark too steeply, gives none.
 //
 // The beam is a Gaussian across, the stem a cylinder, its echo the part of the beam on it times the
 // cosine of incidence. An echo is told with the chance s^3 / (1 + s^3), s its strength over the

@@ -102,8 +102,9 @@ bool refine_among(const PointList& points, const Surroundings& around, double ba
   return true;
 }
 
-// A search for circles in one group. What a circle takes away is looked up by its place: the time
-// is nearly proportional to the points, also where a spoilt map hangs together as one group.
+// A search for circles in one group. The points that a circle takes away are looked up by their
+// place. The time is nearly proportional to the points, even where a spoilt map hangs together as
+// one group.
 class GroupSearch {
  public:
   GroupSearch(PointList points, const CircleSearchConfig& config, std::uint64_t seed)

@@ -34,12 +34,11 @@ struct CircleSearchConfig {
   bool whole_groups = false;
 };
 
-// All circles of each slice, by repeated sampling (RANSAC) in each group of points that hang
-// together (see groups_near) and robust least squares (Gauss-Newton on the geometric distance).
-// Draws are by the place of a group: `seed` and the points near a circle decide on it; points far
-// away and threads do not. The time is nearly proportional to the number of points. Polls
-// `progress`. `work` is told how many points were sorted, fitted and taken away, each as often as
-// it was.
+// All circles of each slice. RANSAC samples each group of points that hang together (see
+// groups_near), and Gauss-Newton minimises a robust geometric distance. Draws are by the place of a
+// group: `seed` and the points near a circle decide on it; points far away and threads do not. The
+// time is nearly proportional to the number of points. Polls `progress`. `work` is told how many
+// points were sorted, fitted and taken away, each as often as it was.
 [[nodiscard]] std::vector<std::vector<Circle>> find_circles(
     const std::vector<std::vector<Eigen::Vector2f>>& slices, const CircleSearchConfig& config,
     std::uint64_t seed, const ProgressSink& progress = {}, std::uint64_t* work = nullptr);

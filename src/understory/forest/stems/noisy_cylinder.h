@@ -12,8 +12,8 @@ namespace understory {
 // displaced along the surface lies outside of it, and the side that was not seen holds nothing
 // against a larger circle. Here the place on the surface from which a point came is unknown and is
 // averaged over (expectation maximisation; Dempster, Laird and Rubin, J. R. Stat. Soc. B 39, 1977):
-// a point's density is the mean of round Gaussians along the circumference, weighted by how much of
-// the stem the directions from which it was seen, found along the way, show of each place.
+// a point's density is the mean of round Gaussians along the circumference. A place's weight is how
+// much of it shows from the directions of view, which are found along the way.
 struct NoisyCylinder {
   bool converged = false;
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();  // at breast height

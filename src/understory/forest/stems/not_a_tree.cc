@@ -14,8 +14,8 @@ namespace {
 
 using namespace stem_constants::not_a_tree;
 
-// A tree goes on upwards. What ends low, with nothing above it near its axis, is none: but only
-// where the heights above were in view, as points around it show.
+// A tree goes on upwards. A stem that ends low, with nothing above it near its axis, is no tree.
+// This holds only where the heights above were in view, as points around show.
 bool ends_low(const StemFit& stem, const PointsNear& near, const StemDetectorConfig& config) {
   if (stem.highest_m > kLowEnd || config.highest_m < kLowEnd + kLeastSpan) return false;
   const StemAxis axis(stem);

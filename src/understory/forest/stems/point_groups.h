@@ -28,8 +28,8 @@ struct PointGroupConfig {
 };
 
 // Groups by their places. A group of undergrowth may go on for a hundred metres. One that is longer
-// than 4 m is cut by a fixed grid of windows of 8 m, so that what is found at a place depends on
-// points within group_reach_m of it alone. Single precision: `points` lie within some km of zero.
+// than 4 m is cut by a fixed grid of windows of 8 m. What is found at a place then depends only on
+// points within group_reach_m of it. Single precision: `points` lie within some km of zero.
 [[nodiscard]] std::vector<PointGroup> groups_near(const std::vector<Eigen::Vector2f>& points,
                                                   const PointGroupConfig& config);
 

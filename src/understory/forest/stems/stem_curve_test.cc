@@ -95,9 +95,9 @@ TEST(StemCurve, TheVolumeIsThatOfTheStem) {
   EXPECT_LT(std::abs(curve.volume_m3 - volume), 2.0 * curve.volume_sd_m3);
 }
 
-// A wide beam shows a stem from one side, and thicker by the same at all heights. Before, sections
-// were followed from the corrected radius, so that thicker ones did not count, and the few points
-// of a section made it seem seen from one side alone.
+// A wide beam shows a stem from one side, and thicker by the same at all heights. Sections were
+// once followed from the corrected radius, so that thicker ones did not count. The few points of a
+// section then made it seem seen from one side alone.
 TEST(StemCurve, WhatWideBeamsAddIsTakenAwayAlongTheStem) {
   Random random(7);
   TestStem stem;

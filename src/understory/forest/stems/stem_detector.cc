@@ -18,8 +18,8 @@ namespace {
 
 using namespace stem_constants::stem_detector;
 
-// Points by square of the ground, to gather those around a stem: sorts them, so that those of a
-// square, and of squares side by side, follow each other.
+// Points sorted by square of the ground, to gather those around a stem. Those of a square, and of
+// squares side by side, follow each other.
 class PointIndex {
  public:
   explicit PointIndex(std::vector<SlicePoint>& points) : end_(points.size()) {

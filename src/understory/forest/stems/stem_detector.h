@@ -80,9 +80,10 @@ struct StemSearchArea {
                                                 const StemSearchArea& where = {},
                                                 const ProgressSink& progress = {});
 
-// The two searches that detect_stems is made of, one after the other: in thin slices, then in thick
-// ones among the points that the stems of the first do not explain. Of a cloud in tiles the second
-// has to know those of the first beyond the tile. Gives the stems with the centre in the area.
+// The two searches of detect_stems, one after the other. The first looks at thin slices, the second
+// at thick ones, among the points that no stem of the first explains. Of a cloud in tiles the
+// second has to know those of the first beyond the tile. Gives the stems with the centre in the
+// area.
 enum class StemCut { kThin, kThick };
 [[nodiscard]] std::vector<StemFit> detect_stems_in_cut(StemCut cut, std::vector<SlicePoint>& points,
                                                        const std::vector<StemFit>& known,

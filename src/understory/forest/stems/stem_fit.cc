@@ -39,8 +39,8 @@ System build_system(const std::vector<SlicePoint>& points, const StemFit& stem,
     const double e = axis.surface_error(place);
     if (std::abs(e) >= reach || place.distance_m < 1e-4) continue;
     const double u = e / reach;
-    // A point stands for its returns: the thinned cloud alone would fill the noise around a
-    // surface evenly, which lies more outside than inside of it.
+    // A point stands for its returns. The thinned cloud alone would fill the noise around a surface
+    // evenly, and more of that lies outside than inside.
     const double weight = static_cast<double>(point.returns) * (1.0 - u * u) * (1.0 - u * u);
     Vector6 jacobian;
     const Eigen::Vector2d out = place.outward.head<2>();
@@ -232,11 +232,12 @@ StemFit thin_start(const std::vector<SlicePoint>& points, const StemFit& start) 
   return thin;
 }
 
-// Returns are not independent and the places on the surface not known, so the errors are larger
-// than the fit's covariance says, the more so the larger it is. Both factors are measured: on maps
-// of simulated recordings with known poses (handheld seeds 1 and 2, harvester seed 1) 95 % of the
-// diameters are then within two standard deviations, near the path and 30 m from it. On top comes
-// what no fit can see: keyframes that do not quite lie on each other, a stem that is not round.
+// Returns are not independent, and their places on the surface are not known. The errors are
+// therefore larger than the fit's covariance says, and more so where it is large. Both factors are
+// measured on maps of simulated recordings with known poses (handheld seeds 1 and 2, harvester seed
+// 1). With them 95 % of the diameters are within two standard deviations, near the path and 30 m
+// from it. On top comes what no fit can see: keyframes that do not quite lie on each other, a stem
+// that is not round.
 void set_uncertainty(const NoisyCylinder& fit, StemFit& stem) {
   const double spread = std::sqrt(std::max(1e-12, fit.covariance(4, 4)));
   const double factor = kLinear * kLinear + std::pow(kSquare * spread, 2);
@@ -280,8 +281,8 @@ StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& sta
   result.converged = true;
   result.evidence.scatter_m = scatter;
   judge(points, config, result);
-  // Errors of a map are alike for neighbouring points (drift, ranging), so the number of
-  // independent measurements is that of patches on the surface, not of points.
+  // Errors of a map (drift, ranging) are alike for neighbouring points. The number of independent
+  // measurements is therefore that of patches on the surface, not of points.
   const int patches = std::max(1, result.evidence.patches);
   const double thinning = std::max(1.0, system.weight / patches);
   const Matrix6 covariance = scatter * scatter * thinning * inverse_matrix(system.normal);

@@ -13,8 +13,8 @@ struct StemEvidence {
   int on = 0;       // thinned points on the surface
   int returns = 0;  // returns of the cloud that they stand for
   int inside = 0;   // points well within the stem: of a real one there are none
-  // Points per area just inside and just outside of the surface's band over those on it: a stem's
-  // inside is empty, in foliage all three are alike.
+  // Points per area just inside and just outside of the surface's band, over those on it. A stem's
+  // inside is empty; in foliage all three are alike.
   double inside_ratio = 0.0;
   double outside_ratio = 0.0;
   double even_arc_deg = 0.0;  // see ArcBins::even_deg

@@ -98,7 +98,7 @@ class TileAbove {
     for (std::size_t i = 0; i < around_.stems.size(); ++i)
       tops_.push_back(columns_.top(i, task_.slices_end_m));
     // Near a scanner the ground has a hundred times the points of a crown, and the ceiling may lie
-    // under it: what is no higher than the top of its tree is real.
+    // under the crown. A point below the top of its tree is real.
     for (const HeldBack& point : held_back_) {
       if (static_cast<double>(point.over_foot_m) <= tops_[point.tree])
         canopy_.add(point.place.cast<double>(), static_cast<double>(point.height_m));

@@ -58,8 +58,8 @@ using ListedHeight = std::function<double(std::size_t stem, double top_m)>;
 class OwnerTiles {
  public:
   OwnerTiles(const TiledCloud& cloud, const Eigen::Vector3d& origin);
-  // Gives each cube to a tree, from the cubes and trees within 18 m of each tile (three crowns'
-  // reach), and measures the crowns: one for each tree. `trees` in the order of task.stems.
+  // Gives each cube to a tree, from the cubes and trees within 18 m of each tile (the reach of
+  // three crowns). Then it measures one crown for each tree. `trees` in the order of task.stems.
   std::vector<TreeCrown> find(const CrownTask& task, TileShelf<std::uint64_t>& cubes,
                               const std::vector<OwnerTree>& trees);
   // Of one tile. Owners are indices of `trees`.

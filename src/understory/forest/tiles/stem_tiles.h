@@ -47,10 +47,10 @@ class SlicesNear {
   Eigen::Vector3d origin_;
 };
 
-// Stems of a cloud, tile by tile: they are the same whatever the tiles are, as what is farther from
-// a stem than stem_search_reach has no influence on it. (Where stems or circles compete with each
-// other in a row of 3 m and more, the first of the row may; not one has been seen.) Slices and
-// stems are relative to `origin` (world frame). Polls `progress`.
+// Stems of a cloud, tile by tile. They are the same whatever the tiles are: what is farther from a
+// stem than stem_search_reach has no influence on it. (In a row of 3 m and more, where stems or
+// circles compete, the first of the row may have; no case has been seen.) Slices and stems are
+// relative to `origin` (world frame). Polls `progress`.
 [[nodiscard]] StemHarvest find_stems(const TiledCloud& cloud, const GroundModel& ground,
                                      const Eigen::Vector3d& origin,
                                      const StemDetectorConfig& config,

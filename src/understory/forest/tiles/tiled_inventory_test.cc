@@ -60,8 +60,8 @@ class SortedCloud : public TiledCloud {
   std::vector<std::vector<Eigen::Vector3d>> points_;
 };
 
-// A strip of 100 m by 12 m on a slope, longer than a tile with all that is around it: stems at the
-// borders of 20 and 25 m and elsewhere, a hedge along it, undergrowth.
+// A strip of 100 m by 12 m on a slope, longer than a tile and its surroundings. Stems stand at the
+// borders of 20 and 25 m and elsewhere, with a hedge and undergrowth.
 const Cloud& stand() {
   static const Cloud cloud = [] {
     TestPlot plot(11);

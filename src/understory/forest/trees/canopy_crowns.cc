@@ -116,8 +116,8 @@ class Watershed {
     next_.emplace(std::min(heights_.values[cell], at_most), -(order_++), cell);
   }
 
-  // A cell counts as a crown where any of its points is one, so cells at the open edge hold half of
-  // what they seem to.
+  // A cell counts as a crown where any of its points is one. Cells at the open edge therefore hold
+  // half of what they seem to.
   void measure() {
     const double cell_m2 = heights_.cell_m * heights_.cell_m;
     for (int row = 0; row < heights_.rows; ++row) {

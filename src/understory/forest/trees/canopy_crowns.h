@@ -44,8 +44,8 @@ struct CanopyCrowns {
   [[nodiscard]] std::int32_t at(const Eigen::Vector2d& place) const;
 };
 
-// Tops of a raster of canopy heights (metres above the ground, NaN where nothing is known) and the
-// cells that belong to each: a watershed that begins at the tops (F. Meyer, Signal Processing
+// Tops of a raster of canopy heights (metres above the ground, NaN where nothing is known), and the
+// cells of each. The method is a watershed that begins at the tops (F. Meyer, Signal Processing
 // 38(1):113-125, 1994). A crown reaches down to a share of its height, and as far from its top as
 // the crown of a tree can (see TreeOwners). Deterministic.
 [[nodiscard]] CanopyCrowns find_canopy_crowns(const Raster& canopy,

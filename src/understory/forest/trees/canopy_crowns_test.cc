@@ -17,8 +17,8 @@ struct Cone {
   double radius_m;
 };
 
-// Cones that fall to half of their height at their edge, on open ground: the highest of 25 points
-// of each cell, as in a canopy model.
+// Cones that fall to half of their height at their edge, on open ground. A cell has the highest of
+// 25 points, as in a canopy model.
 Raster canopy_of(const std::vector<Cone>& cones) {
   Raster canopy;
   canopy.x0 = 100.0;

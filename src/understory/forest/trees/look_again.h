@@ -32,8 +32,8 @@ struct LookPlace {
     const std::vector<StandingStem>& stems,
     const std::function<bool(const Eigen::Vector2d&)>& walkable);
 
-// Degrees of the circumference of a stem that are unseen yet and would show from a place: within 62
-// degrees on both sides of the direction to it.
+// Degrees of the circumference of a stem that are yet unseen and would show from a place. A place
+// shows 62 degrees on both sides of the direction to it.
 [[nodiscard]] int newly_seen_deg(const StandingStem& stem, const Eigen::Vector2d& from);
 
 // Whether so little of a stem was seen that another side of it is wanted; else it was seen all

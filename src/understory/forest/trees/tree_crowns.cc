@@ -124,8 +124,8 @@ double width_of(const Places& places, const Eigen::Vector2d& stem) {
   return std::sqrt(outline_area(places, stem) / M_PI);
 }
 
-// The lowest wide layer that hangs together with the widest one above the lower third: a bush at
-// the foot of a tree is no crown. The number of layers if there is none.
+// The lowest wide layer that hangs together with the widest one above the lower third. A bush at
+// the foot of a tree is therefore no crown. The number of layers if there is none.
 std::size_t base_of(const std::vector<double>& widths, double radius_m) {
   std::vector<double> sorted = widths;
   std::sort(sorted.begin(), sorted.end());

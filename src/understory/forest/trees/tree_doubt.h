@@ -22,8 +22,8 @@ struct StandDoubts {
 [[nodiscard]] StandDoubts doubts_of(const std::vector<Tree>& trees);
 
 // How doubtful a tree is, to sort trees by it: larger is worse, 0 is certain. The relative standard
-// deviation of the diameter over 30 %, plus the share of the stem's circumference that was not seen
-// beyond a half, plus 0.5 without a height. `arc_deg`: the part that was seen, 0 to 360, NaN if
+// deviation of the diameter over 30 %, plus the share of the circumference beyond a half that was
+// not seen. Without a height 0.5 is added. `arc_deg`: the part that was seen, 0 to 360, NaN if
 // unknown. A tree without a diameter is more doubtful than any with one.
 [[nodiscard]] double doubt_of(const Tree& tree, double arc_deg);
 

@@ -26,9 +26,9 @@ class TreeColumns {
   std::size_t add(const Eigen::Vector3d& point, double height_m);
 
   // Height of a tree's top above the ground. The top is the highest point that hangs together with
-  // its stem (gaps of at most 3 m) and is nearer to it than to any other stem. Ghosts of other
-  // pulses are left aside (see HeightColumn). NaN where nothing is seen above the stem's slices, or
-  // where the points end as if cut off just above them: that is no tree top.
+  // its stem, with gaps of at most 3 m. It is nearer to its stem than to any other. Ghosts of other
+  // pulses are left aside (see HeightColumn). NaN where nothing is seen above the stem's slices.
+  // NaN also where the points end as if cut off just above them: that is no tree top.
   [[nodiscard]] double top(std::size_t stem, double slices_end_m) const;
   [[nodiscard]] double ground_m(std::size_t stem) const { return ground_m_[stem]; }
   // Points in so many decimetres below a height; of each decimetre 255 stand for more.

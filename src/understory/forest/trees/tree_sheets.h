@@ -11,8 +11,8 @@
 
 namespace understory {
 
-// From which sides the surface of a stem was seen, by 10 degrees, counted from east towards north
-// of the frame: the side that looks there holds points.
+// From which sides the surface of a stem was seen, by 10 degrees from east towards north of the
+// frame. A side is seen if the surface that faces it holds points.
 using SeenSides = std::bitset<36>;
 
 // A few points of one tree, for a look at how well it is measured (P4 figs. 9-12).

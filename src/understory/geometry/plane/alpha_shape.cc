@@ -71,8 +71,8 @@ Corners corners_of(const std::vector<Vector2d>& points, double side) {
 }
 
 // Groups with less than twice the radius from one to the next. No triangle of the shape reaches
-// from one group to another, and no point of another group lies in such a triangle's circle, so
-// each group has its own triangulation.
+// from one group to another. No point of another group lies in such a triangle's circle, so each
+// group has its own triangulation.
 std::vector<std::vector<int>> groups_of(const std::vector<Vector2d>& points, double radius) {
   const double reach = 2.0 * radius;
   std::unordered_map<std::int64_t, std::vector<int>> cells;

@@ -38,7 +38,7 @@ TEST(AlphaClusters, TellTreesApartAndLeaveOutSinglePoints) {
     EXPECT_EQ(clusters[i], 1);
 }
 
-// The definition itself, by all triples: a triangle belongs to the shape if its circle is not
+// The definition itself, by all triples. A triangle belongs to the shape if its circle is not
 // larger than the radius and holds no other point.
 std::vector<std::set<std::size_t>> by_all_triples(const std::vector<Vector2d>& p, double radius) {
   std::vector<std::set<std::size_t>> clusters;

@@ -139,8 +139,8 @@ class Mesh {
   std::vector<int> stack_;
 };
 
-// Points brought to the unit square and moved apart by a millionth of their spacing, so that the
-// corners of a square grid do not lie on one circle; -1 in `order` for doubles.
+// Points brought to the unit square and moved apart by a millionth of their spacing. The corners of
+// a square grid then do not lie on one circle; -1 in `order` for doubles.
 std::vector<Vector2d> spread(const std::vector<Vector2d>& points) {
   Vector2d low = points.front();
   Vector2d high = points.front();
@@ -231,7 +231,7 @@ double mean_neighbour_distance(const std::vector<Vector2d>& points) {
       sums[b].balance -= static_cast<int>(a) + 1;
     }
   }
-  // Inner points start one edge of each triangle around them, so each neighbour counts once, and
+  // Inner points start one edge of each triangle around them. So each neighbour counts once, as it
   // comes once as the next corner and once as the one before.
   double inner = 0.0;
   double all = 0.0;

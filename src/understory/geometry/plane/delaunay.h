@@ -17,8 +17,8 @@ namespace understory {
     const std::vector<Eigen::Vector2d>& points);
 
 // L0 of P0 (23): mean over the points of the mean distance to their natural neighbours, metres. 0
-// where there is no triangulation. Points of the convex hull, whose neighbours lie along the edge
-// of the view, are left out where enough others are left (the paper leaves out the periphery).
+// where there is no triangulation. Points of the convex hull have neighbours along the edge of the
+// view. They are left out where enough others are left (the paper leaves out the periphery).
 [[nodiscard]] double mean_neighbour_distance(const std::vector<Eigen::Vector2d>& points);
 
 }  // namespace understory

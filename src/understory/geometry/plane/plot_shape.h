@@ -27,7 +27,7 @@ struct PlotShape {
   [[nodiscard]] bool contains(const Eigen::Vector2d& point) const;
   // Metres to the nearest point of any ring; infinite without rings.
   [[nodiscard]] double distance_to_border(const Eigen::Vector2d& point) const;
-  // Where the line y = `y` crosses the rings, in ascending order: inside lies between the first and
+  // Where the line y = `y` crosses the rings, in ascending order. Inside lies between the first and
   // the second crossing, the third and the fourth, and so on.
   [[nodiscard]] std::vector<double> crossings(double y) const;
   // West, south, east and north edge; infinite (and reversed) without rings.
@@ -45,7 +45,7 @@ void orient(PlaneRing& ring, bool against_the_clock);
                                     double radius_m,
                                     const Eigen::Matrix2d& squeeze = Eigen::Matrix2d::Identity());
 
-// What a plane slope does to a circle whose radius was measured along the ground: in the direction
+// What a plane slope does to a circle whose radius was measured along the ground. In the direction
 // of the gradient it shrinks by the cosine of the slope. `gradient`: rise per metre along x and y.
 [[nodiscard]] Eigen::Matrix2d slope_squeeze(const Eigen::Vector2d& gradient);
 

@@ -25,8 +25,8 @@ struct SolvedRun {
 // Settings of positions by satellites beside or in the graph.
 struct FusedPathConfig {
   GnssFusionConfig fusion;
-  // Standard deviations of the odometry over those that the graph states, which are large so that
-  // loops close [chosen: drift on handheld is 0.002 to 0.015 % of 250 m, stated are 0.06 %].
+  // Standard deviations of the odometry over those that the graph states. The graph's are large so
+  // that loops close [chosen: drift on handheld is 0.002 to 0.015 % of 250 m, stated are 0.06 %].
   double odometry_scale = 0.1;
   // Standard deviation of its natural logarithm before the positions are looked at.
   double odometry_scale_log = 1.0;

@@ -46,11 +46,11 @@ struct GlobalPose {
   Eigen::Vector3d turn_sd_deg = Eigen::Vector3d::Zero();
 };
 
-// Lays the odometry on the globe while it runs (P4's future work): heading and place in the plane,
-// height and tilt, with the receiver's slow, steady and fast errors (ReceiverFilters). The headings
-// of a second antenna count while the positions do not contradict them. Takes the poses in order of
-// time, and the fixes up to each before it. Memory and work on a scan do not grow with the run.
-// Deterministic; not thread-safe.
+// Lays the odometry on the globe while it runs (P4's future work). It estimates heading and place
+// in the plane, height, tilt, and the receiver's slow, steady and fast errors (ReceiverFilters).
+// The headings of a second antenna count while the positions do not contradict them. Takes the
+// poses in order of time, and the fixes up to each before it. Memory and work on a scan do not grow
+// with the run. Deterministic; not thread-safe.
 class OnlineGeoreference {
  public:
   explicit OnlineGeoreference(const OnlineGeoreferenceConfig& config);

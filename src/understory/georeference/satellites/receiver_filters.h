@@ -9,7 +9,7 @@
 
 namespace understory {
 
-// The prior of a receiver's errors for the filters below: as ReceiverPriorConfig, and the
+// The prior of a receiver's errors for the filters below. It is ReceiverPriorConfig with the
 // correlation time of the steady error [tuned: the four GNSS presets of
 // docs/method/georeference.md, seeds up to 19].
 struct ReceiverFilterConfig {

@@ -444,7 +444,7 @@ MatrixXd noise_covariance(const NoisyTimes& times, const NoiseBelief& belief) {
   return covariance;
 }
 
-VectorXd runaways_m(const NoisyTimes& times, const ReceiverNoise& noise,
+VectorXd outliers_m(const NoisyTimes& times, const ReceiverNoise& noise,
                     const MatrixXd& residuals) {
   NoisyTimes regular = times;
   regular.extra_sd_m.setZero();

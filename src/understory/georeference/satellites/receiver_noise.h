@@ -50,8 +50,8 @@ struct NoiseBelief {
   // logarithm, and a mean.
   [[nodiscard]] double slow_sd_m() const;  // with the steady part
   [[nodiscard]] double fast_sd_m() const;
-  // Of an error that is independent from pair to pair, each `step_s` after the other, and tells as
-  // little of a mean as the fast one.
+  // Of an error that is independent from pair to pair, with pairs `step_s` apart. It tells as
+  // little of a mean as the fast error does.
   [[nodiscard]] double white_fast_sd_m(double step_s) const;
   [[nodiscard]] double correlation_s() const;
   // Standard deviation of the slow and steady error of a pair with that scale, over slow_sd_m().
@@ -90,7 +90,7 @@ double whiten(const NoisyTimes& times, const ReceiverNoise& noise, Eigen::Matrix
 // Of each pair the length of its residual (a column an axis) beside the slow and the steady errors
 // that the residuals make probable. It is 0 where it is not over four standard deviations of the
 // fast error. Pairs in time; metres.
-[[nodiscard]] Eigen::VectorXd runaways_m(const NoisyTimes& times, const ReceiverNoise& noise,
+[[nodiscard]] Eigen::VectorXd outliers_m(const NoisyTimes& times, const ReceiverNoise& noise,
                                          const Eigen::MatrixXd& residuals);
 
 // How the noise is looked for.
@@ -101,10 +101,10 @@ struct NoiseSearch {
   bool integrate = true;
 };
 
-// Generalised least squares over series that share one kind of noise. The noise is integrated out
-// (restricted likelihood times prior, importance sampling around the most probable one), so few
-// fixes with independent errors give a wide covariance. `information` of a Gaussian prior about
-// zero; it may be singular where the series tell. Deterministic; thread-safe.
+// Generalised least squares over series that share one kind of noise. The noise is integrated out:
+// restricted likelihood times prior, importance sampling around the most probable one. So few fixes
+// with independent errors give a wide covariance. `information` of a Gaussian prior about zero; it
+// may be singular where the series tell. Deterministic; thread-safe.
 [[nodiscard]] NoisyEstimate estimate_under_noise(const NoisyTimes& times,
                                                  const std::vector<NoisySeries>& series,
                                                  const Eigen::MatrixXd& information,

@@ -191,9 +191,9 @@ TEST(ReceiverNoise, ARunawayIsNoSlowError) {
   Random random(5);
   const ReceiverNoise noise{2.0, 100.0, 0.3, 2.0};
   VectorXd errors = drawn(times, noise, random);
-  EXPECT_EQ((runaways_m(times, noise, errors).array() > 0.0).count(), 0);
+  EXPECT_EQ((outliers_m(times, noise, errors).array() > 0.0).count(), 0);
   errors.segment(60, 5).array() += 20.0;
-  const VectorXd found = runaways_m(times, noise, errors);
+  const VectorXd found = outliers_m(times, noise, errors);
   EXPECT_GT(found.segment(60, 5).minCoeff(), 1.0);
   EXPECT_GT(found.segment(60, 5).maxCoeff(), 4.0);
   EXPECT_EQ(found.head(55).maxCoeff(), 0.0);

@@ -113,8 +113,8 @@ void SatelliteBelief::align(const GlobalPose& on_globe, const StampedPose& pose)
   if (!(on_globe.turn_sd_deg.z() <= config_.first_heading_sd_deg)) return;
   if (!(on_globe.place_sd_m.head<2>().maxCoeff() <= config_.first_plane_sd_m)) return;
   origin_ = on_globe.place;
-  // Heading and place alone: the IMU has levelled the world better than positions over a short
-  // stretch can, where a centimetre on a metre is half a degree.
+  // Heading and place alone. The IMU has levelled the world better than positions over a short
+  // stretch can: there a centimetre on a metre is half a degree.
   const Eigen::Quaterniond turn =
       pose.world_from_body.rotation() * on_globe.enu_from_body.conjugate();
   world_from_enu_ = Pose(about_up(turn), pose.world_from_body.translation());

@@ -54,11 +54,10 @@ void describe(ConfigTable& table, SatelliteBeliefConfig& config);
 // What is believed of a scan's pose by positions of satellites, as penalties or priors of its
 // match, P3 sections 3.2, 3.3 and 5.1. The path of the first stretch lays the world frame on east,
 // north, up; from then on it stays there. Position: the newest fix, carried on by the odometry; a
-// fix that leaves the way of the odometry counts less. Heading: while the carrier moves, the course
-// by the fixes, against where it went in the first stretch, seen from the body; while it stands,
-// none. Gravity: the IMU's. So nothing of it depends on how the map has drifted.
-// Takes the poses in order of time, and the fixes up to each before it. Deterministic; not
-// thread-safe.
+// fix that leaves the way of the odometry counts less. Heading, while the carrier moves: the course
+// by the fixes, against the body's course in the first stretch. While it stands, none. Gravity: the
+// IMU's. So nothing of it depends on how the map has drifted. Takes the poses in order of time, and
+// the fixes up to each before it. Deterministic; not thread-safe.
 class SatelliteBelief {
  public:
   // `tilt_sd_deg`: how far the world's up may be off, see tilt_sd_deg() of split_fit.h.

@@ -17,7 +17,7 @@ struct SatelliteSmoothingConfig {
   PairingConfig pairing;
   Pose body_from_imu;
   ImuNoiseConfig imu;
-  // Errors of a receiver are correlated over that long: a position counts as much as the mean of
+  // Errors of a receiver are correlated over that long. A position counts as much as the mean of
   // independent ones over the interval would [tuned: docs/method/georeference.md, seeds up to 19].
   double correlation_s = 150.0;
   double overconfidence = 2.2;  // true over stated error of a position [tuned: the same]

@@ -114,7 +114,7 @@ TEST(SatelliteSmoothing, GivesTheTruePosesFromAWrongStart) {
   }
 }
 
-// Fixes that err by metres are smoothed, and up is that of gravity: the fit in six degrees of
+// Fixes that err by metres are smoothed, and up is that of gravity. The fit in six degrees of
 // freedom takes the tilt of the run from it.
 TEST(SatelliteSmoothing, TheTiltOfARunComesFromGravity) {
   const auto fixes = received(2.0);

@@ -22,8 +22,8 @@ struct SecondAntennaConfig {
   double most_sigmas = 4.0;
 };
 
-// The turn about up from the world to east, north, up that the headings of all pairs tell, rad: a
-// median, and the standard deviation of what it stands for.
+// The turn about up from the world to east, north, up, by the headings of all pairs, rad. It is a
+// median, with the standard deviation of it.
 struct TurnByHeadings {
   double turn_rad = 0.0;
   double sd_rad = 0.0;

@@ -86,7 +86,7 @@ NoisyTimes stated(const std::vector<SatellitePair>& pairs, bool plane, double mo
 }
 
 // The residual of each pair that lies far off the others, both as it is and over what the receiver
-// states of it; 0 for the others.
+// states. 0 for the others.
 VectorXd far_off_m(const VectorXd& off_m, const VectorXd& scale, double median) {
   const VectorXd relative = off_m.cwiseQuotient(scale);
   const auto sd_of = [&](const VectorXd& all) {
@@ -164,10 +164,10 @@ class Splitter {
     if (!config_.robust) return;
     const Eigen::Matrix3Xd off = residuals();
     fit_.plane_times.extra_sd_m =
-        runaways_m(fit_.plane_times, *plane_search_.near, off.topRows<2>().transpose());
+        outliers_m(fit_.plane_times, *plane_search_.near, off.topRows<2>().transpose());
     if (fit_.height_known)
       fit_.height_times.extra_sd_m =
-          runaways_m(fit_.height_times, *height_search_.near, off.row(2).transpose());
+          outliers_m(fit_.height_times, *height_search_.near, off.row(2).transpose());
   }
 
   [[nodiscard]] Eigen::Matrix3Xd residuals() const {

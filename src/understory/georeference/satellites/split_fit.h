@@ -75,17 +75,18 @@ struct SplitFit {
   std::optional<UsedHeadings> headings;  // nothing: fewer than three pairs have one
 };
 
-// Heading and place from the positions in the plane and the headings of a second antenna, height
-// and tilt from the heights and from how level the run's world is. The errors of the fixes are
-// correlated in time, and their size is estimated along (`estimate_under_noise`). Headings that
-// contradict the positions are left out. `pairs` all have heights or none counts. Not found for
-// fewer than three pairs, or where the path spans less than five metres and there are no headings.
-// Deterministic; thread-safe.
+// Heading and place come from the positions in the plane and the headings of a second antenna.
+// Height and tilt come from the heights, and from how level the run's world is. The errors of the
+// fixes are correlated in time, and their size is estimated along (`estimate_under_noise`).
+// Headings that contradict the positions are left out. `pairs` all have heights or none counts. Not
+// found for fewer than three pairs, or where the path spans less than five metres and there are no
+// headings. Deterministic; thread-safe.
 [[nodiscard]] SplitFit fit_split(const std::vector<SatellitePair>& pairs,
                                  const SplitFitConfig& config);
 
-// Covariance of a right perturbation of `target_from_source` (rotation first) from that of a turn
-// about the target's axes through `middle` and a shift (rotation first), and back.
+// Covariance of a right perturbation of `target_from_source` (rotation first), from that of a turn
+// about the target's axes and a shift (rotation first). The turn is through `middle`. The other
+// function leads back.
 [[nodiscard]] Matrix6d right_from_spread(const Matrix6d& spread, const Pose& target_from_source,
                                          const Eigen::Vector3d& middle);
 [[nodiscard]] Matrix6d spread_from_right(const Matrix6d& covariance, const Pose& target_from_source,

@@ -17,9 +17,9 @@
 #include "understory/util/angles.h"
 #include "understory/util/random.h"
 
-// A real robot in a real forest (Foret Montmorency): wheel odometry of 316 m, fused with every
-// tenth position of its truth, which is made as bad as a receiver under trees. The truth is
-// positions alone, in NAD83(CSRS) / MTM zone 7 (EPSG:2949).
+// A real robot in a real forest (Foret Montmorency): wheel odometry of 316 m and every tenth
+// position of its truth. That is made as bad as a receiver under trees. The truth is positions
+// alone, in NAD83(CSRS) / MTM zone 7 (EPSG:2949).
 namespace understory {
 namespace {
 

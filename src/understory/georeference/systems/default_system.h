@@ -6,8 +6,9 @@
 
 namespace understory {
 
-// Whether a place is in Finland, by a coarse outline: some kilometres at the border with Norway and
-// Russia, half a kilometre between Tornio and Haparanda. It holds the sea of the archipelagos.
+// Whether a place is in Finland, by a coarse outline. It is some kilometres off at the border with
+// Norway and Russia, half a kilometre between Tornio and Haparanda. It holds the sea of the
+// archipelagos.
 [[nodiscard]] bool is_in_finland(const GeodeticPlace& place);
 
 // How heights of layers are counted.

@@ -12,11 +12,10 @@ namespace understory {
 class CoordinateSystem;
 
 // The frame that the layers of a run are written in: map.laz, rasters, trees.gpkg. It is a
-// coordinate system where the place on the globe is known, else a local frame in metres. The way
-// from the world frame leads through a rigid motion to east, north, up at a place, from there to
-// latitude and longitude, and by PROJ into the system. Points between the nodes of a grid are
-// interpolated, within 0.1 mm of PROJ up to latitudes of 75 degrees (layer_frame_test.cc). Not
-// thread-safe.
+// coordinate system where the place on the globe is known, else a local frame in metres. A rigid
+// motion leads from the world frame to east, north, up at a place. From there it goes to latitude
+// and longitude, and by PROJ into the system. Points between the nodes of a grid are interpolated,
+// within 0.1 mm of PROJ up to latitudes of 75 degrees (layer_frame_test.cc). Not thread-safe.
 class LayerFrame {
  public:
   // The world frame itself.

@@ -96,7 +96,7 @@ inline std::vector<Eigen::Vector2d> planted_places(const ForestPlan& plan, Rando
 }
 
 // Places at random, denser in clumps.
-inline std::vector<Eigen::Vector2d> wild_places(const ForestPlan& plan, Random& random) {
+inline std::vector<Eigen::Vector2d> random_places(const ForestPlan& plan, Random& random) {
   const DensityWaves waves(random);
   SpacedPlaces spaced(plan.spacing_m);
   const auto count = static_cast<std::size_t>(plan.per_ha * plan.side_m * plan.side_m / 1e4);
@@ -115,7 +115,7 @@ inline std::vector<Tree> make_forest(const ForestPlan& plan, Random& random) {
   const DensityWaves growth(random);
   std::vector<Tree> trees;
   for (const Eigen::Vector2d& at :
-       plan.row_m > 0.0 ? planted_places(plan, random) : wild_places(plan, random)) {
+       plan.row_m > 0.0 ? planted_places(plan, random) : random_places(plan, random)) {
     Tree tree;
     tree.id = static_cast<int>(trees.size()) + 1;
     tree.x = at.x();

@@ -28,7 +28,7 @@ struct PatternFit {
                                      const PatternGrid& target, const PlaneMotion& start,
                                      const TreeLikeness& likeness, int steps);
 
-// The same likelihood ratio from the other side: each tree of the target that lies in the source's
+// The same likelihood ratio from the other side. Each tree of the target that lies in the source's
 // area is one of its trees, or none. It tells more where the source has nearly all trees: then a
 // tree of the target without a partner speaks against the place. `source` lies as in the fit.
 [[nodiscard]] double reverse_score(const PatternGrid& source, const PatternGrid& target,

@@ -16,8 +16,8 @@ struct PatternTree {
   double rank = std::numeric_limits<double>::quiet_NaN();
 };
 
-// Where a map of trees counts as seen: within `reach_m` of a tree, and then `shrink_m` back from
-// the edge of that, so that gaps close and the outline stays.
+// Where a map of trees counts as seen: within `reach_m` of a tree, then `shrink_m` back from the
+// edge of that. Gaps close, and the outline stays.
 struct SeenArea {
   double reach_m = 16.0;
   double shrink_m = 0.0;

@@ -46,8 +46,8 @@ SourcePart part_around(const std::vector<PatternTree>& trees, const Vector2d& mi
   return part;
 }
 
-// Trees per square metre around half of the trees at least: neighbours within a circle, so that it
-// does not depend on how the map is turned.
+// Trees per square metre around half of the trees at least. Neighbours are those within a circle,
+// so that a turn of the map changes nothing.
 double usual_density(std::span<const Tree> trees, const std::vector<std::size_t>& indices) {
   std::vector<PatternTree> places;
   for (const std::size_t i : indices)

@@ -17,9 +17,9 @@ struct SourcePart {
   double reach_m = 0.0;                              // of the farthest from the centre
 };
 
-// Of the trees `indices`, those that a map of `density` trees per square metre would show: the
-// tallest, or the thickest where heights are not known, or all where neither is. From below one
-// sees thin trees under the crowns, which the air does not show. In the order of `indices`.
+// Of the trees `indices`, those that a map of `density` trees per square metre would show. They are
+// the tallest, or the thickest without heights, or all without both. From below one sees thin trees
+// under the crowns, which the air does not show. In the order of `indices`.
 [[nodiscard]] std::vector<std::size_t> dominant_trees(std::span<const Tree> trees,
                                                       const std::vector<std::size_t>& indices,
                                                       double density);

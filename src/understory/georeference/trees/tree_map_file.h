@@ -18,13 +18,14 @@ struct TreeMapFile {
 };
 
 // Reads a map of trees: a CSV table (.csv, .csv.gz, .txt), or points that GDAL reads (GeoPackage,
-// shapefile, GeoJSON): its layer `trees`, else the first one with points.
+// shapefile, GeoJSON). Of layers it takes `trees`, else the first one with points.
 //
 // Columns are found by name in any case: x, y (or east_m, north_m; easting, northing; longitude,
-// latitude), z, height_m (or height, h), dbh_m (or dbh, d; dbh_cm). A diameter without a unit in
-// its name is taken for centimetres where the median is above 2, for millimetres above 200. A
-// median that no stand has is remarked on. `crs` is the system of a file that states none. Throws
-// InputError where there is no such file, no tree, no position, or a cell is no number.
+// latitude), z, height_m (or height, h). The diameter is dbh_m (or dbh, d; dbh_cm). A diameter
+// without a unit in its name is taken for centimetres where the median is above 2, for millimetres
+// above 200. A median that no stand has is remarked on. `crs` is the system of a file that states
+// none. Throws InputError where there is no such file, no tree, no position, or a cell is no
+// number.
 [[nodiscard]] TreeMapFile read_tree_map(const std::filesystem::path& path, const std::string& crs);
 
 }  // namespace understory

@@ -146,7 +146,7 @@ double chance_of(const std::vector<PatternFit>& fits, double poses) {
   return std::min(1.0, std::exp(tried - k * fits.front().score));
 }
 
-// The fit to ever more of the source around the part, so that a long map that is a little bent is
+// The fit to ever more of the source around the part. A long map that is a little bent is so
 // followed from the part on. It ends where the rest no longer fits.
 PatternFit grown(const PatternFit& start, const std::vector<PatternTree>& all, double reach_m,
                  const PatternGrid& target) {

@@ -13,9 +13,9 @@ namespace understory {
 // The error of the path is taken as a random walk. The relative position of views j < i is
 // uncertain by the sum of the variances of the steps between. What two pairs ask about is
 // correlated by the steps that they share. A match of a pair with noise r tells 1/2 ln(1 + v / r)
-// nats. v is the variance that is left after the matches taken so far, as in Gaussian process
-// regression over the path (P1 section 5 names it for the corrections themselves). Not thread-safe;
-// deterministic.
+// nats. v is the variance that is left after the matches taken so far. It follows from Gaussian
+// process regression over the path (P1 section 5 names it for the corrections themselves). Not
+// thread-safe; deterministic.
 class GainQueue {
  public:
   // `step_variance_m2[k]` is of the step from view k - 1 to k; `noise_m2[c]` of a match of pair c.

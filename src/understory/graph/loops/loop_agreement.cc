@@ -200,9 +200,9 @@ std::vector<std::size_t> LoopAgreement::set_within(const std::vector<std::size_t
   return left == 0 ? set : std::vector<std::size_t>{};
 }
 
-// A part that no loop contradicts another part of is worked out alone: what is chosen in one does
-// not change what is chosen in another. A seed changes only its own part, so the largest set is
-// made of the sets without a seed, but for one part.
+// A part whose loops contradict those of no other part is worked out alone. What is chosen in one
+// does not change what is chosen in another. A seed changes only its own part, so the largest set
+// is made of the sets without a seed, but for one part.
 std::vector<std::size_t> LoopAgreement::largest_set() const {
   constexpr auto kNone = std::numeric_limits<std::size_t>::max();
   const std::vector<std::vector<std::size_t>> parts = contested();

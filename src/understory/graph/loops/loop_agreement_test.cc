@@ -110,7 +110,7 @@ TEST(LoopAgreement, IsTheDefinitionHoweverTheLoopsCame) {
   }
 }
 
-// Loops that contradict each other far from others: the largest set is made part by part, with the
+// Loops that contradict each other far from others. The largest set is made part by part, with the
 // same result as from each loop in turn.
 TEST(LoopAgreement, PartsThatContradictNoOtherAreWorkedOutAlone) {
   const PoseGraphConfig config;

@@ -74,9 +74,9 @@ struct [[nodiscard]] LoopVerification {
   int starts = 0;
 };
 
-// Decides whether two places are the same, P2-7: a match for a first estimate, another to refine,
-// and checks that a chance match among stems does not pass. Pure function of its inputs; may run in
-// the background. Parallel inside; same bits for any number of threads.
+// Decides whether two places are the same, P2-7. A first match gives an estimate, another refines
+// it, and checks make sure that a chance match among stems does not pass. Pure function of its
+// inputs; may run in the background. Parallel inside; same bits for any number of threads.
 LoopVerification verify_loop(const LoopInput& input, const LoopClosureConfig& config);
 
 }  // namespace understory

@@ -21,8 +21,8 @@ struct LoopSearchConfig {
   // Uncertainty: keyframes count as recent as long as the way since is shorter than this, whatever
   // their number.
   double exclude_path_m = 25.0;
-  // And as long as they lie farther away than this share of the way since: a straight path sees its
-  // own past for long, from behind, and learns nothing from it.
+  // Loops must also lie farther away than this share of the way since. A straight path sees its own
+  // past for long, from behind, and learns nothing from it.
   double max_chord_ratio = 0.5;
   double view_radius_m = 20.0;  // how far scans overlap usefully
   double min_overlap = 0.5;     // expected share of common view, at the best the drift allows

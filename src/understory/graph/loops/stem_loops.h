@@ -28,9 +28,9 @@ struct StemLoop {
   int query = 0;
   int match = 0;         // an earlier view
   double overlap = 0.0;  // of the two views after matching, 0..1; else of those laid together
-  // Overlap as laid together, less the farther the views are apart (views of one place overlap
-  // wherever they look from, but also with the next place): overlap * exp(-(distance /
-  // max_distance_m)^2).
+  // Overlap as laid together, less the farther the views are apart: overlap * exp(-(distance /
+  // max_distance_m)^2). Views of one place overlap wherever they look from, but also with the next
+  // place.
   double score = 0.0;
   Pose match_from_query;
   Matrix6d covariance = Matrix6d::Identity();  // right perturbation

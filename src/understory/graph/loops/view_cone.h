@@ -19,9 +19,9 @@ struct ViewCone {
 // for views without stems. Deterministic.
 [[nodiscard]] ViewCone estimate_view_cone(const std::vector<SparsePoints>& level_views);
 
-// Overlap of two views by their poses alone, P0 section 2.4 and figure 8: the share of the one's
-// sector that lies in the other's too, seen from above. Heights and tilt do not count. Immutable,
-// thread-safe.
+// Overlap of two views by their poses alone, P0 section 2.4 and figure 8. It is the share of the
+// one's sector that lies in the other's too, seen from above. Heights and tilt do not count.
+// Immutable, thread-safe.
 class ConeOverlap {
  public:
   explicit ConeOverlap(const ViewCone& cone);

@@ -40,7 +40,7 @@ std::size_t fine_cells(const SparsePoints& map, const std::vector<std::uint32_t>
   return cells.count();
 }
 
-// The points by the coarse cell that they lie in, half way between both maps: sights of a tree on
+// The points by the coarse cell that they lie in, half way between both maps. Sights of a tree on
 // the border of two parts then split alike in both. And where in that order each cell begins.
 struct Parts {
   std::vector<std::uint32_t> order;

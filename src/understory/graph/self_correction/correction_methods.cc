@@ -17,8 +17,8 @@ namespace {
 
 using namespace graph_constants::correction_methods;
 
-// Applies one correction after the other and ends with the sharpest map on the way: the stop rule
-// that the paper asks for in its section 4.
+// Applies one correction after the other and ends with the sharpest map on the way. The paper asks
+// for this stop rule in its section 4.
 class PowerChain {
  public:
   PowerChain(const CorrectionViews& views, const SelfCorrectionConfig& config,

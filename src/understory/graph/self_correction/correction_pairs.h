@@ -49,9 +49,10 @@ void describe(ConfigTable& table, PairConfig& config);
 // P0 (27).
 [[nodiscard]] bool acceptable(double error_m, double overlap, const PairConfig& config);
 
-// e of a pair of views as they are placed. It is the mean distance in the plane from the stems of
-// the source that lie in the target's sector to the nearest of the target's. The worst share of
-// `outlier_ratio` is left out. NaN where fewer than `kFewestStems` lie in the sector.
+// e of a pair of views as they are placed. It is a mean distance in the plane. From each stem of
+// the source that lies in the target's sector, the distance to the target's nearest stem counts.
+// The worst share of `outlier_ratio` is left out. NaN where fewer than `kFewestStems` lie in the
+// sector.
 [[nodiscard]] double placed_error(const SparseTarget& target, const SparsePoints& source,
                                   const Pose& target_from_source, const ConeOverlap& overlap,
                                   double outlier_ratio);

@@ -65,7 +65,7 @@ class PathProcess {
   }
 
   // Sums over the steps of every two observations, of 1 and of the place of the step as seen from
-  // the observation's later view: all that covariances need, whatever the scale is.
+  // the observation's later view. Covariances need no more, whatever the scale is.
   void set_length(double length_views) {
     length_views_ = length_views;
     sums_.assign(observations_.size(), {});

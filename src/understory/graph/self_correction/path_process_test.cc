@@ -23,7 +23,7 @@ struct Walk {
   std::vector<Pose> odometry;
 };
 
-// A winding way; what the steps get wrong has the sd of step_variances, times 3 in yaw and in the
+// A winding way. What the steps get wrong has the sd of step_variances, times 3 in yaw and in the
 // plane, and is alike over `length` views.
 Walk walk(unsigned seed, double length) {
   std::mt19937 random(seed);

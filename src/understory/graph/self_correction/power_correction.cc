@@ -10,7 +10,7 @@ namespace understory {
 namespace {
 
 // Sums of `step(k)` for k = j + 1..l, over that for k = j + 1..i. They begin at j + 1, as a step
-// belongs to the view that it leads to (the sums as printed begin at j and would not be 0 there).
+// belongs to the view that it leads to. The sums as printed begin at j and would not be 0 there.
 template <typename Step>
 std::vector<double> cumulative(int j, int i, const Step& step) {
   std::vector<double> u(at(i - j + 1), 0.0);

@@ -32,8 +32,8 @@ enum class PowerForm {
 struct PowerConfig {
   PowerCoefficient coefficient = PowerCoefficient::kPathLength;
   PowerForm form = PowerForm::kCorrected;
-  // a and b of the distance d = sqrt(a theta^2 + b |q|^2) of (31) and (32): a is the mean square
-  // of the distance at which stems are seen, so that d is about how far they move.
+  // a and b of the distance d = sqrt(a theta^2 + b |q|^2) of (31) and (32). a is the mean square of
+  // the distance of stems, so that d is about how far they move.
   double metric_rotation_m2 = 400.0;
   double metric_translation = 1.0;
 };
@@ -47,8 +47,8 @@ struct PowerConfig {
                                                      const std::vector<double>& step_errors, int j,
                                                      int i, const PowerConfig& config);
 
-// Places view i by its new match to j, spreads the correction over the views between, P0 (19), and
-// carries it rigidly to all later ones, P0 (20). Views up to j stay. Other poses' differences do
+// Places view i by its new match to j, and spreads the correction over the views between, P0 (19).
+// All later views move with it rigidly, P0 (20). Views up to j stay. Other poses' differences do
 // not change: T'_k^-1 T'_l = T_k^-1 T_l for k, l >= i.
 void apply_power_correction(std::vector<Pose>& world_from_view,
                             const std::vector<double>& step_errors, int j, int i,

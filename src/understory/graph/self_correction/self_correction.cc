@@ -24,8 +24,8 @@ void describe_power(ConfigTable& table, PowerConfig& config) {
                   {"match_error", PowerCoefficient::kMatchError},
                   {"metric", PowerCoefficient::kMetric},
                   {"screw", PowerCoefficient::kScrew}},
-                 "how a correction is shared among the views between two ends: by number, by path "
-                 "length, by errors of the matches, by a metric, or along a screw");
+                 "how a correction is shared among the views between two ends: by number, path "
+                 "length, errors of the matches, a metric, or along a screw");
   table.add("metric_rotation_m2", config.metric_rotation_m2, {0.0, 1e6}, "m^2",
             "coefficient metric: weight of a squared angle");
   table.add("metric_translation", config.metric_translation, {0.0, 1e6}, "",

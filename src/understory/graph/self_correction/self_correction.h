@@ -17,8 +17,8 @@
 
 namespace understory {
 
-// How a map of stems corrects itself: some pairs of views that see the same trees are matched
-// again, and what they say is spread over the views between.
+// How a map of stems corrects itself. Some pairs of views that see the same trees are matched
+// again, and their corrections are spread over the views between.
 enum class CorrectionMethod {
   kNone,
   kPowers,  // P0 section 2: powers of the correction, acting in the frame of the earlier view

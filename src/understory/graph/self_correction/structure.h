@@ -22,8 +22,8 @@ class Structure {
   [[nodiscard]] const Points& points() const { return points_; }
 
   // Share of `source`'s points, moved by `this_from_source`, that lie in or beside an occupied cell
-  // here, among those that fall where this cloud has seen anything. 0 if fewer than `min_points`
-  // do.
+  // here. The denominator is those that fall where this cloud has seen anything. 0 if fewer than
+  // `min_points` do.
   [[nodiscard]] double overlap(const Points& source, const Pose& this_from_source,
                                std::size_t min_points) const;
 

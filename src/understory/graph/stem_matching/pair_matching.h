@@ -47,8 +47,8 @@ struct Gathering {
   double least_share = 0.0;
 };
 
-// Views around one, laid together in its frame by their poses: stems seen in several views are
-// means, those seen once among three views or more are left out.
+// Views around one, laid together in its frame by their poses. Stems seen in several views are
+// means; those seen once among three views or more are left out.
 [[nodiscard]] SparsePoints gather_views(const std::vector<SparsePoints>& views,
                                         const std::vector<Pose>& world_from_view, int centre,
                                         const Gathering& gathering);

@@ -8,8 +8,8 @@
 
 namespace understory {
 
-// The stems of a view, each with its star: by what its natural neighbours in the Delaunay
-// triangulation lie off it, as in the localisation that P0's section 3 names.
+// The stems of a view, each with its star: where its natural neighbours in the Delaunay
+// triangulation lie from it. The localisation that P0's section 3 names uses such stars.
 struct StarView {
   std::vector<Eigen::Vector2d> stems;               // level frame of the view, metres
   std::vector<std::vector<Eigen::Vector2d>> stars;  // offsets, same order as stems

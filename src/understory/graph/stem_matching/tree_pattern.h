@@ -9,7 +9,7 @@
 
 namespace understory {
 
-// Finds where a view of stems was seen before, without any guess: by the triangles that
+// Finds where a view of stems was seen before, without any guess. It compares the triangles that
 // neighbouring stems form, with the heights of their corners against each other. All lengths are in
 // L0, the mean neighbour distance of the stand, so that nothing is tuned to a site.
 struct TreePatternConfig {

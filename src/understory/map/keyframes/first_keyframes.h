@@ -26,11 +26,10 @@ void describe(ConfigTable& table, FirstKeyframesConfig& config);
 
 // The first keyframes of a map have little to be matched to: one scan, which for few rings is some
 // curves on the ground. They are matched once more, last to first, to the map that those after them
-// make, with what odometry says of the motion to the next one as a prior. `segment` are the
-// keyframes of one segment from its first on, `points` gives the i-th one's points in its body
-// frame. Returns world_from_body of the first `config.keyframes` of them; nothing if the segment is
-// too short. Those that do not match move along with the next. The same bits for any number of
-// threads.
+// make. What odometry says of the motion to the next one is a prior. `segment` are the keyframes of
+// one segment from its first on, `points` gives the i-th one's points in its body frame. Returns
+// world_from_body of the first `config.keyframes` of them; nothing if the segment is too short.
+// Those that do not match move along with the next. The same bits for any number of threads.
 [[nodiscard]] std::vector<Pose> refine_first_keyframes(
     std::span<const Keyframe> segment,
     const std::function<std::shared_ptr<const FeaturePoints>(std::size_t)>& points,

@@ -12,8 +12,8 @@
 
 namespace understory {
 
-// What is too far away is looked for in the local map only now and then, at every so many
-// keyframes: it means going over all of it.
+// What is too far away is looked for in the local map only at every so many keyframes: it means
+// going over all of it.
 inline constexpr std::size_t kForgetEvery = 8;
 
 // What a KeyframeMap is made of and what grows with a run.

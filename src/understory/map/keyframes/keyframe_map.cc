@@ -223,7 +223,7 @@ void KeyframeMap::finish(const ProgressSink& progress) {
   local_map_.clear();
   if (config_.first_keyframes.enabled) refine_first_keyframes_of_segments(progress);
   points_->forget();
-  give_free_memory_back();
+  return_freed_memory();
 }
 
 void KeyframeMap::refine_first_keyframes_of_segments(const ProgressSink& progress) {

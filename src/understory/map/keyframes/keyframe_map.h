@@ -36,7 +36,7 @@ struct KeyframeConfig {
   // paper.
   double voxel_size_m = 0.1;
   // A scan becomes a keyframe, too, when it finds less than this share of what scans usually find
-  // again in the map: it sees what the rings of the others left out. 0: never.
+  // again in the map. It sees what the rings of the others left out. 0: never.
   double below_found_share = 0.0;
   // The same where a match's fitness (RegistrationResult::fitness_m2) exceeds this. 0: never.
   double above_fitness_m2 = 0.0;
@@ -78,8 +78,8 @@ class KeyframeMap {
     double edge_rotation_deg_per_sqrt_m = 0.02;
     double edge_translation_m_per_sqrt_m = 0.01;
     // By the limit of the memory of the run, no settings of their own. They say which keyframes'
-    // points stay in memory, and whether the local map of a found loop is made only when the
-    // present one is gone.
+    // points stay in memory. They also say whether the local map of a found loop is made only when
+    // the present one is gone.
     std::size_t cached_keyframes = map_constants::keyframe_map::kCachedKeyframes;
     bool one_local_map = false;
   };
@@ -98,12 +98,12 @@ class KeyframeMap {
   // has been applied to the new keyframe as well.
   [[nodiscard]] std::optional<Pose> add(TimeNs stamp, const KeyframeOffer& offer,
                                         const FeaturePoints& points_in_body);
-  // Begins anew after the scans could not be matched any more: the next keyframe is joined to the
+  // Begins anew after the scans could not be matched any more. The next keyframe is joined to the
   // last one by a prediction only, and the local map starts empty.
   void start_segment();
-  // The recording is over: waits for what is running, optimises, positions the first keyframes of
-  // each segment again, and frees what only scans needed: there is no local map any more.
-  // Polls `progress`.
+  // Ends the recording: waits for what is running, optimises, positions the first keyframes of each
+  // segment again, and frees what only scans needed. There is no local map any more. Polls
+  // `progress`.
   void finish(const ProgressSink& progress = {});
   // Of the finished map: whether its clouds tell of ranges that are all too long or too short.
   //   lidar_in_body: where the beams begin, metres

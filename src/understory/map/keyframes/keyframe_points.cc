@@ -12,9 +12,8 @@ KeyframePoints::KeyframePoints(const std::filesystem::path& file, const RecordCo
                                std::size_t cached)
     : clouds_(file, known), cached_(cached) {}
 
-// What says that a cloud has features stands in the column of intensities, which these clouds do
-// not have: a feature is its number and one, and 0 is none at all. The lidar stands in the column
-// of times.
+// The column of intensities, which these clouds do not have, says whether a cloud has features. A
+// feature is its number and one, and 0 is none at all. The lidar stands in the column of times.
 void KeyframePoints::append(TimeNs stamp, const FeaturePoints& cloud) {
   const std::lock_guard lock(mutex_);
   KeyframeCloud stored{static_cast<std::int32_t>(clouds_.size()), stamp, {}, {}};

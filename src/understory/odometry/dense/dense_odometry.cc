@@ -37,7 +37,7 @@ void describe(ConfigTable& table, ScanMatchConfig& config) {
             "a match counts if it finds this share of what the matches before it found, or more");
   table.add("few_found_residual", config.few_found_residual, {0.0, 100.0}, "",
             "a match that finds less counts if its distance from the map is at most so many times "
-            "the usual one; 0: it never counts; of sparse scans 1.5");
+            "the usual one. 0: it never counts; of sparse scans 1.5");
   table.add(
       "coarse_above_sigma", config.coarse_above_sigma, {0.0, 100.0}, "reaches",
       "standard deviation of the prediction above which a match begins with its widest steps. A "

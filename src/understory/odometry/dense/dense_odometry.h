@@ -32,9 +32,9 @@ namespace understory {
 struct ScanMatchConfig {
   // A match counts only with this share of the scan's points near the map.
   double min_inlier_ratio = 0.1;
-  // Nor does one that suddenly finds less than this share of what matches found before it: a jump
-  // of the position, or something before the lidar. (In good runs no scan finds less than 0.8 of
-  // it.)
+  // Nor does one that suddenly finds less than this share of what matches found before it. The
+  // position has jumped then, or something stands before the lidar. (In good runs no scan finds
+  // less than 0.8 of it.)
   double min_inlier_share = 0.5;
   // But a scan with few rings that turns over even ground lies between the rings of the map, and
   // finds little of what is there. Such a match counts if what it finds lies on the map's surfaces
@@ -42,7 +42,7 @@ struct ScanMatchConfig {
   // it does not count.
   double few_found_residual = 0.0;
   // The match begins from far (MatchStart) where the prediction may be off by more than this share
-  // of the local map's reach (one sigma), or the last scan found no match.
+  // of the local map's reach (one sigma). It does so, too, where the last scan found no match.
   double coarse_above_sigma = 0.25;
   // Weight of the prediction in the match, 0 = it is only the start. In directions that a scan
   // leaves undetermined the prior keeps the match from wandering.

@@ -12,10 +12,9 @@ struct [[nodiscard]] GateVerdict {
   double velocity_jump_m_s = 0;  // how much the match changes, or would change, the velocity
 };
 
-// `before`: the state at the scan before; `predicted`: at this scan, without the match;
-// `with_match`: with it; `match`: the pose of the IMU that matching gave, with the covariance of a
-// right perturbation (rotation first). What match or prediction do not know opens the gate.
-// Thread-safe.
+// `before` is the state at the scan before, `predicted` the one at this scan without the match,
+// `with_match` with it. `match` is the IMU's pose by matching, with the covariance of a right
+// perturbation (rotation first). What match or prediction do not know opens the gate. Thread-safe.
 GateVerdict judge_match(const MotionConfig& config, const ImuState& before,
                         const MotionPrediction& predicted, const ImuState& with_match,
                         const Pose& match, const Matrix6d& match_covariance);

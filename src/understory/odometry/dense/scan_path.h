@@ -42,7 +42,7 @@ struct ScanPathCorrection {
                                                  TimeNs duration, const Pose& start,
                                                  const ScanPathConfig& config);
 
-// The path with the corrections applied; `path.front()` is at the stamp, and the correction of a
+// The path with the corrections applied, with `path.front()` at the stamp. The correction of a
 // later pose is in proportion to its time, also beyond the duration.
 [[nodiscard]] std::vector<StampedPose> corrected_path(std::span<const StampedPose> path,
                                                       const Pose& start, TimeNs duration,

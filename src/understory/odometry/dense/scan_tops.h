@@ -23,9 +23,9 @@ void describe(ConfigTable& table, ScanTopsConfig& config);
 
 // The tree tops of a deskewed scan with the points around them, P2 (1), in the order of the scan.
 // `world_from_body` turns its points so that z is up; `lidar` is the lidar's place in the body
-// frame, metres. Nothing where all points are asked for, where the lidar hangs below the middle one
-// of the tops (before lift-off there are hardly any in view), and where the points are too few.
-// Thread-safe.
+// frame, metres. Nothing where all points are asked for, or the points are too few. Nothing, too,
+// where the lidar hangs below the middle one of the tops: before lift-off there are hardly any in
+// view. Thread-safe.
 [[nodiscard]] std::optional<BodyCloud> keep_tree_tops(const BodyCloud& cloud,
                                                       const Pose& world_from_body,
                                                       const ScanTopsConfig& config);

@@ -14,9 +14,9 @@ struct AssumedMotion {
   Eigen::Vector3d angular_rate_rad_s = Eigen::Vector3d::Zero();
 };
 
-// Whether a recording began within a turn of its lidar: the first scan is shorter than the second
-// or, where points have no times, sees less around it. The next scan then comes so soon that a
-// small error between the two is a great speed.
+// Whether a recording began within a turn of its lidar. The first scan is then shorter than the
+// second or, where points have no times, sees less around it. The next scan then comes so soon that
+// a small error between the two is a great speed.
 [[nodiscard]] bool is_part_of_turn(const Scan& first, const Scan& second);
 
 // A carrier that is on its way when the recording begins smears its first scan, and the second,

@@ -11,8 +11,8 @@ namespace understory {
 
 // Compares what the IMU says with what the lidar says, to find swapped axes, wrong extrinsics and
 // wrong units. Rotation: turns between scans by matching against integrated rates. Gravity: the
-// mean specific force over a second, turned into the world by the lidar's attitude, must point the
-// same way at all times and have the length of gravity.
+// mean specific force over a second, turned into the world by the lidar's attitude. It must point
+// the same way at all times and have the length of gravity.
 //
 // An IMU that is contradicted before it has ever agreed is put on probation: the motion model goes
 // on without it. So a wrong IMU no longer bends the lidar's turns that it is measured by, until
@@ -23,7 +23,7 @@ class TrustMonitor {
   explicit TrustMonitor(double gravity_m_s2) : gravity_(gravity_m_s2) {}
 
   // Turn of the IMU from scan to scan, as rotation vectors in its frame at the first scan. One is
-  // from matching, one from the gyroscope without any estimate of its bias: an estimate that
+  // from matching, one from the gyroscope without any estimate of its bias. An estimate that
   // follows the lidar would hide what is looked for. `gyro_turning`: all that it turned, to and
   // fro, radians.
   void add_turn(const Eigen::Vector3d& by_lidar, const Eigen::Vector3d& by_gyro,
@@ -38,7 +38,7 @@ class TrustMonitor {
   void suspect(TimeNs now);
   // Time goes on: a probation that comes to no verdict ends, for the IMU.
   void pass_time(TimeNs now);
-  // A run before this one doubted the IMU up to `until` and found it right: up to then nothing is
+  // A run before this one doubted the IMU up to `until` and found it right. Up to then nothing is
   // held against it, and it counts as proven. To be called before the first turn.
   void vouch_until(TimeNs until);
   [[nodiscard]] bool vouched_for(TimeNs now) const { return now <= vouched_until_; }

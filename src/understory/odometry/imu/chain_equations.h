@@ -27,7 +27,7 @@ class StateSolver {
 };
 
 // The residual of a motion and its derivatives in standard deviations (L^-1 of each, with L L^T the
-// covariance), so that products of them are symmetric to the last bit.
+// covariance). So products of them are symmetric to the last bit.
 struct WhiteMotion {
   Eigen::Matrix<double, 9, 15> by_from;
   Eigen::Matrix<double, 9, 15> by_to;

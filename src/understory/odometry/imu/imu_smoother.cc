@@ -168,8 +168,8 @@ void ImuSmoother::watch_imu(TimeNs stamp, const MotionInterval& interval,
   if (buffer_.ever_filled()) watch_.note_samples(!interval.samples.empty(), latest().stamp, stamp);
 }
 
-// After scan matches kept contradicting the prediction for long, or the IMU turned out to be
-// unusable, nothing that the estimate says of the motion is worth keeping.
+// Scan matches have contradicted the prediction for long, or the IMU turned out to be unusable.
+// Nothing that the estimate says of the motion is then worth keeping.
 void ImuSmoother::restart_at(TimeNs stamp, const PoseFactor& lidar,
                              const Eigen::Vector3d& velocity) {
   ImuState state = latest();

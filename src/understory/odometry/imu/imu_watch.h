@@ -15,8 +15,8 @@ struct ImuMatch {
   double rotation_sigma_rad = 0.0;  // standard deviation about the least certain axis
 };
 
-// Watches the IMU during a run (whether it agrees with the lidar, whether it is silent) and says in
-// the log, once each, how its standing changes. Not thread-safe.
+// Watches the IMU during a run: whether it agrees with the lidar, and whether it is silent. It says
+// in the log, once each, how its standing changes. Not thread-safe.
 class ImuWatch {
  public:
   // `log` may be null, must outlive the watch.
@@ -37,8 +37,8 @@ class ImuWatch {
   // Two matches in a row and the samples between them (not empty), with ends at the two stamps.
   void compare(const ImuMatch& from, const ImuMatch& to,
                const std::vector<InertialSample>& samples);
-  // Whether there were any usable samples between two scans: none where a gap is longer than the
-  // filter bridges, or while the IMU is left out.
+  // Whether there were any usable samples between two scans. There are none where a gap is longer
+  // than the filter bridges, or while the IMU is left out.
   void note_samples(bool any, TimeNs from, TimeNs to);
 
   void save(BinaryWriter& writer) const;

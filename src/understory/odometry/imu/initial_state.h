@@ -20,8 +20,8 @@ struct InitialState {
                                               TimeNs stamp, const Pose& body_from_imu,
                                               const ImuNoiseConfig& config);
 
-// True if the samples could come from a carrier at rest: at least 0.3 s of them, whose scatter is
-// that of noise and whose mean is gravity without turning.
+// True if the samples could come from a carrier at rest. There must be 0.3 s of them, with the
+// scatter of noise and the mean of gravity without turning.
 [[nodiscard]] bool is_still(const std::vector<InertialSample>& samples,
                             const ImuNoiseConfig& config);
 

@@ -34,8 +34,9 @@ gtsam::SharedNoiseModel gaussian(const gtsam::Matrix& covariance) {
   return gtsam::noiseModel::Gaussian::Covariance(covariance);
 }
 
-// The joint belief in one state as a linear factor on its pose, velocity and bias: the marginal of
-// the part of the history that was left behind. A nonlinear factor, because iSAM2 relinearises.
+// The joint belief in one state as a linear factor on its pose, velocity and bias. It is the
+// marginal of the part of the history that was left behind. A nonlinear factor, because iSAM2
+// relinearises.
 class StatePrior : public gtsam::NoiseModelFactor3<gtsam::Pose3, gtsam::Vector3, Bias> {
  public:
   StatePrior(std::size_t k, const ImuState& state, const Matrix15d& covariance)

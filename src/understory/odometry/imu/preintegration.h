@@ -44,7 +44,7 @@ struct Preintegration {
                                           const ImuNoiseConfig& noise);
 
 // The stand-in where the IMU is silent: constant velocity and constant angular rate (in the frame
-// of the IMU), disturbed by white accelerations of the given densities.
+// of the IMU). White accelerations of the given densities disturb it.
 [[nodiscard]] Preintegration constant_velocity_interval(double duration,
                                                         const Eigen::Vector3d& angular_rate,
                                                         double accel_sigma,

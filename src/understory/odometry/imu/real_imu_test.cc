@@ -19,8 +19,8 @@ struct Log237 {
   std::vector<StampedPose> poses;
 };
 
-// 237 s of a handheld scanner (Newer College): IMU at 100 Hz and a trajectory at 10 Hz, which its
-// makers most likely got from this IMU and the lidar, so it is no independent truth.
+// 237 s of a handheld scanner (Newer College): IMU at 100 Hz and a trajectory at 10 Hz. Its makers
+// most likely got that from this IMU and the lidar, so it is no independent truth.
 bool read_log(Log237& log) {
   const char* data = std::getenv("UNDERSTORY_DATA");
   const std::filesystem::path folder =
@@ -57,8 +57,8 @@ struct Errors {
   int count = 0;
 };
 
-// Smooths up to each pose (biases and velocity from the past alone), then predicts a second ahead
-// with the IMU alone and compares with the trajectory.
+// Smooths up to each pose (biases and velocity from the past alone). Then it predicts a second
+// ahead with the IMU alone and compares with the trajectory.
 Errors predict_a_second(const Log237& log) {
   ImuNoiseConfig noise;
   noise.gyro_noise_rad_s_sqrt_hz = 5e-4;

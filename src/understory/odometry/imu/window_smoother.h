@@ -35,8 +35,8 @@ struct InitialUncertainty {
 
 // Fixed-lag smoother over the last states: Gauss-Newton over the window, the oldest state
 // marginalised exactly (at its linearisation) into a Gaussian prior on the next. The direction of
-// gravity in the world is estimated with the states, so that a first attitude that was off by some
-// degrees is not taken for a bias of the accelerometer. Plain values throughout: bounded memory,
+// gravity in the world is estimated with the states. A first attitude that was off by some degrees
+// is then not taken for a bias of the accelerometer. Plain values throughout: bounded memory,
 // written and read bit for bit. Not thread-safe.
 class WindowSmoother {
  public:

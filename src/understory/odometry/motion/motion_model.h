@@ -104,8 +104,9 @@ class MotionModel {
   // as far as it reaches and constant velocity beyond.
   [[nodiscard]] virtual NavState predict(TimeNs t) const = 0;
 
-  // Poses from `from` to `to` (both included), one per IMU sample in between and at least both
-  // ends, in order of time, for deskewing a scan. `from` is at or after the last scan's stamp.
+  // Poses from `from` to `to` (both included), in order of time, for deskewing a scan. There is one
+  // for each IMU sample in between, and at least both ends. `from` is at or after the last scan's
+  // stamp.
   [[nodiscard]] virtual std::vector<StampedPose> predict_path(TimeNs from, TimeNs to) const = 0;
 
   // Adds a state at `stamp`, with a lidar factor if the match was usable. The first call defines
@@ -119,10 +120,10 @@ class MotionModel {
   // True (warned of in the log, too) unless the IMU contradicts the lidar: swapped axes, wrong
   // extrinsics, wrong units.
   [[nodiscard]] virtual ImuTrust imu_trust() const = 0;
-  // The position was lost with it: unless it has agreed with the lidar before, the IMU is left out
+  // The position was lost with it. Unless it has agreed with the lidar before, the IMU is left out
   // until it is clear whether it is right.
   virtual void suspect_imu(TimeNs now) = 0;
-  // A run before this one left the IMU out up to `until` and found it right: up to then it is not
+  // A run before this one left the IMU out up to `until` and found it right. Up to then it is not
   // doubted again, and matches that contradict it are dropped. To be called before the first scan.
   virtual void vouch_for_imu(TimeNs until) = 0;
 
@@ -183,8 +184,8 @@ struct MotionConfig {
   int isam2_restart = 100;  // states between restarts from the marginals
   ImuNoiseConfig imu;
   LidarNoiseConfig lidar;
-  // P2-8. A match that changes the velocity by more than this against the reference is dropped
-  // (the paper's reference is the previous state); 0 turns the gate off.
+  // P2-8. A match that changes the velocity by more than this against the reference is dropped. The
+  // paper's reference is the previous state; 0 turns the gate off.
   double velocity_gate_m_s = 1.0;
   double angular_gate_deg_s = 30.0;  // the same for the turn since the last scan
   VelocityGateReference velocity_gate_reference = VelocityGateReference::kPrediction;

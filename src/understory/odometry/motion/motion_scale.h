@@ -17,8 +17,8 @@ class MotionScale {
     Eigen::Vector3d speed = Eigen::Vector3d::Zero();  // gained, m/s
     Eigen::Vector3d way = Eigen::Vector3d::Zero();    // m
   };
-  // From one match to the next, in order and without a pause between calls: the step in the world,
-  // metres; what the force does in it; s.
+  // From one match to the next, in order and without a pause between calls. Takes the step in the
+  // world, metres; what the force does in it; and seconds.
   void add(const Eigen::Vector3d& step, const Drive& drive, double duration_s);
   // What comes next does not follow what came last.
   void interrupt();

@@ -13,8 +13,8 @@ namespace understory {
 class ResidualScale {
  public:
   // A match was off its prediction by `residual` (right perturbation, rad and m, rotation first,
-  // frame of the IMU), whose stated variance is `variance` (that of the prediction and of the
-  // match, each over 0).
+  // frame of the IMU). `variance` is its stated variance: that of the prediction and of the match,
+  // each over 0.
   void add(const Vector6d& residual, const Vector6d& variance);
   // A covariance in the same frame with the standard deviations that the residuals speak for; as it
   // is before there are enough of them.

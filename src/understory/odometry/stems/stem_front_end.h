@@ -59,12 +59,11 @@ struct StemScan {
   double reach_m = 0.0;  // nine of ten stems are nearer
 };
 
-// Raw scans to positions from their stems alone: stems of each scan (features/stem_segments.h),
-// each moved to the scan's stamp by the motion at its own time, then matched to those before. The
-// motion within a scan is first guessed from the steps before it and, once the scan has been
-// matched, taken from its own step. An IMU, where
-// there is one, tells turns and helps to hold the tilt, as long as it agrees with the stems. Not
-// thread-safe; deterministic.
+// Raw scans to positions from their stems alone. Stems of each scan (features/stem_segments.h) are
+// moved to its stamp by the motion at their times, then matched to those before. The motion within
+// a scan is first guessed from the steps before it and, once the scan has been matched, taken from
+// its own step. An IMU, where there is one, tells turns and helps to hold the tilt, as long as it
+// agrees with the stems. Not thread-safe; deterministic.
 class StemFrontEnd {
  public:
   explicit StemFrontEnd(const StemFrontEndConfig& config)
@@ -101,8 +100,8 @@ class StemFrontEnd {
     Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
     bool any = false;
   };
-  // The stems of a scan along up as it was last, or along that of the directions that may be up
-  // along which most stems stand.
+  // The stems of a scan along up as it was last. Without that, up is the direction, of those that
+  // may be up, along which most stems stand.
   [[nodiscard]] FoundStems find_stems(const Scan& scan, const Rig& rig, const ImuBuffer* samples);
   // Up in the lidar as it was last. At first both ends of gravity, where there is an IMU, of the z
   // axis of the lidar and of that of the body. An earlier one is the likelier.

@@ -15,11 +15,11 @@ struct StemUp {
   int stems = 0;            // with a known axis; 0: up_in_body is what was given
   double sd_rad = 0.0;      // of up_in_body, where more than the stems knows of it; else 0
 };
-// `about_up` is up in the body as it is known otherwise, within 90 degrees: it tells which end of
+// `about_up` is up in the body as it is known otherwise, within 90 degrees. It tells which end of
 // an axis is the upper one, and stays where fewer than three axes are known.
 [[nodiscard]] StemUp stem_up(const StemView& view, const Eigen::Vector3d& about_up);
 // Up of a view of which nothing else is known, unit. It is the mean of the axes if most of them
-// point to one side, as those of upright stems do, else the z axis of the body.
+// point to one side, as those of upright stems do. Else it is the z axis of the body.
 [[nodiscard]] Eigen::Vector3d up_of_axes(const StemView& view);
 
 // A turn that makes `up_in_body` the z axis: the smallest one. Where up is more than 120 degrees

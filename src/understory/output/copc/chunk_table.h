@@ -13,8 +13,8 @@ struct LazChunk {
 };
 
 // The table of chunks as it stands behind the points of a LAZ file: version, number of chunks, then
-// points and bytes of each, as differences to those of the chunk before, by the arithmetic coder
-// and the integer compressor of LASzip (M. Isenburg, "LASzip: lossless compression of LiDAR data",
+// points and bytes of each. They are differences to the chunk before, by the arithmetic coder and
+// the integer compressor of LASzip (M. Isenburg, "LASzip: lossless compression of LiDAR data",
 // 2013; A. Said, HPL-2004-76). LASzip's interface writes no table for chunks of other streams.
 [[nodiscard]] std::string laz_chunk_table(const std::vector<LazChunk>& chunks);
 

@@ -12,8 +12,8 @@
 
 namespace understory {
 
-// The place of a node in the octree, as COPC names it: its level and how many nodes of that level
-// lie before it along each axis.
+// The place of a node in the octree, as COPC names it: its level, and its number along each axis of
+// that level.
 struct CopcKey {
   std::int32_t level = 0;
   std::array<std::int32_t, 3> at{};

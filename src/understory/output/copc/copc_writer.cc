@@ -121,7 +121,7 @@ struct Extent {
       if (high[axis] - low[axis] > high[best] - low[best]) best = axis;
     return best;
   }
-  // The side of the cube around all, in steps: the longest axis and a little more, so that no point
+  // The side of the cube around all, in steps: the longest axis and a little more. No point then
   // lies on the border of a node, where readers round to either side.
   [[nodiscard]] double side() const {
     return static_cast<double>(high[longest()] - low[longest()]) + kBorderSteps;
@@ -212,7 +212,7 @@ struct CopcWriter::Impl {
     return page;
   }
 
-  // Bounds of the cloud as the header has them: along the longest axis they are those of the cube,
+  // Bounds of the cloud as the header has them. Along the longest axis they are those of the cube,
   // because some readers (copclib) take its place from there.
   struct Bounds {
     Eigen::Vector3d low = Eigen::Vector3d::Zero();

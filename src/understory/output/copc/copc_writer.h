@@ -18,10 +18,10 @@ namespace understory {
 [[nodiscard]] bool suits_copc(const LasOptions& options);
 
 // Cloud Optimized Point Cloud 1.0 (https://copc.io): LAZ 1.4 of point format 6 whose chunks are the
-// nodes of an octree, so that a viewer reads only what it shows. Points wait in memory or on the
-// disk (32 bytes each) until `commit` builds the octree, in some 300 MB of memory whatever their
-// number. Nodes are compressed in parallel. The file appears with `commit`; it has the same bytes
-// for any number of threads. Failures are OutputErrors. Not thread-safe.
+// nodes of an octree. A viewer then reads only what it shows. Points wait in memory or on the disk
+// (32 bytes each) until `commit` builds the octree, in some 300 MB of memory whatever their number.
+// Nodes are compressed in parallel. The file appears with `commit`; it has the same bytes for any
+// number of threads. Failures are OutputErrors. Not thread-safe.
 class CopcWriter {
  public:
   CopcWriter(const std::filesystem::path& path, const LasOptions& options,

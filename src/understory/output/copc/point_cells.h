@@ -14,9 +14,8 @@
 namespace understory {
 
 // Points of a cloud by the cells of a grid. As many as may wait in memory are sorted together.
-// Where there are more they go to a file of the system's that has no name, so that nothing of it
-// stays behind a killed process. Within a cell points keep the order in which they came. Not
-// thread-safe.
+// Where there are more they go to a file of the system's that has no name. So nothing of it stays
+// behind a killed process. Within a cell points keep the order in which they came. Not thread-safe.
 class PointCells {
  public:
   // Cells of 2^bits steps. The file lies in the folder of `file` where one is needed. `in_memory`:

@@ -32,8 +32,8 @@ inline constexpr int kPostgisLayout = 1;
 // Writes all layers in one transaction: either the database holds the whole run, or it is as
 // before. Makes PostGIS's extension, the schema and its tables where they are absent. All runs of a
 // schema are in one coordinate system. Polls `progress`. Throws InputError where a layer cannot be
-// read or its system has no EPSG code, ConfigError where the target is no such text, OutputError
-// where the database refuses or goes away.
+// read or its system has no EPSG code. ConfigError: the target is no such text; OutputError: the
+// database refuses or goes away.
 [[nodiscard]] PostgisOutcome write_postgis(const PostgisRequest& request,
                                            const ProgressSink& progress = {});
 

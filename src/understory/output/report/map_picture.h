@@ -8,7 +8,7 @@
 
 namespace understory {
 
-// The map seen from above, gathered point by point in bounded memory: the grid starts fine and is
+// The map seen from above, gathered point by point in bounded memory. The grid starts fine and is
 // coarsened by two whenever the stand outgrows it. Ground grey by its shape, vegetation green by
 // its height. Deterministic: does not depend on the order of points.
 class MapPicture {

@@ -134,9 +134,10 @@ struct ReportInput {
   double area_m2 = 0.0;  // squares with points, of these trees; 0: unknown
 };
 
-// One self-contained page: no network, no scripts needed to read it (its scripts move the map, sort
-// and filter the table of trees and leaf through the sheets of single trees). It lists the results
-// that lie in its folder by then, and run.json, which is written last. Throws OutputError.
+// One self-contained page that needs no network, and no scripts to be read. Its scripts move the
+// map, sort and filter the table of trees, and leaf through the sheets of single trees. It lists
+// the results that lie in its folder by then, and run.json, which is written last. Throws
+// OutputError.
 void write_report(const std::filesystem::path& path, const ReportInput& input);
 // `files`: names of the results beside it.
 [[nodiscard]] std::string report_html(const ReportInput& input,

@@ -6,7 +6,7 @@
 
 namespace understory {
 
-// Small plots as inline SVG, with axes, units and a grid, in the colours of the page (CSS
+// Small plots as inline SVG, with axes, units and a grid. Their colours are those of the page (CSS
 // variables), so that they follow its light or dark dress.
 struct PlotSeries {
   std::string name;                               // empty: no entry in the legend

@@ -34,11 +34,11 @@ struct LidarClocksOutcome : RunOutcome {
   std::vector<LidarClock> clocks;
 };
 
-// Finds how late the clock of each lidar is: each maps the recording alone and without the IMU,
-// and the IMU is fitted to its path (calibrate_lidar_imu). Places stay as they are given. Writes
-// extrinsics.yaml with all lidars and their `late_s` (for --extrinsics) and calibration.json.
-// Throws InputError where nothing can be found out, OutputError, ConfigError, and Stopped where the
-// user stops it: nothing is written then.
+// Finds how late the clock of each lidar is. Each lidar maps the recording alone and without the
+// IMU, and the IMU is fitted to its path (calibrate_lidar_imu). Places stay as they are given.
+// Writes extrinsics.yaml with all lidars and their `late_s` (for --extrinsics) and
+// calibration.json. Throws InputError where nothing can be found out, OutputError, ConfigError, and
+// Stopped where the user stops it: nothing is written then.
 [[nodiscard]] LidarClocksOutcome run_lidar_clocks(const LidarClocksRequest& request, Log& log,
                                                   const ProgressSink& progress);
 

@@ -14,8 +14,8 @@ namespace understory {
 
 // One call of `understory correct`.
 struct CorrectionRequest {
-  // stems.csv.gz, or a run folder that holds one: then its trajectory.tum is where the correction
-  // begins, and what is made of it has a row for each of its poses.
+  // stems.csv.gz, or a run folder that holds one. The correction of a run folder begins with its
+  // trajectory.tum, and its results have a row for each pose of it.
   std::filesystem::path stems;
   std::filesystem::path run_folder;
   bool overwrite = false;         // what an earlier run left in the folder, finished or not

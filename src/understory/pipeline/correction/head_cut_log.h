@@ -14,8 +14,8 @@
 
 namespace understory {
 
-// What a harvester does to the stand that it maps, and what its computer noted of its head (P1
-// section 4): where and when it felled trees.
+// What a harvester does to the stand that it maps: where and when it felled trees. The log of the
+// computer of its head tells (P1 section 4).
 struct HeadCutLogConfig {
   bool fells = false;    // a machine fells trees meanwhile
   std::string head_log;  // CSV (docs/reference/machine.md); empty: none

@@ -49,8 +49,8 @@ struct GeoreferenceRequest {
   std::optional<double> tilt_sd_deg;
   PathFitConfig path;
   std::filesystem::path terrain_model;
-  // Where the run's origin lies on a terrain model without a coordinate system: x, y, metres, and
-  // the direction of its x axis, degrees anticlockwise from east.
+  // Where the run's origin lies on a terrain model without a coordinate system (x, y, metres). The
+  // third is the direction of its x axis, degrees anticlockwise from east.
   std::optional<std::array<double, 3>> start;
   TerrainFitConfig terrain;
   // A map of trees, or a cloud from the air in which tops are found.
@@ -69,8 +69,8 @@ struct GeoreferenceOutcome : RunOutcome {
   std::map<std::string, Figure> figures;
 };
 
-// Moves a run by a fit after it was made: reads trajectory.tum and what else can be moved of the
-// run folder and writes all of it, moved, to another one. Throws InputError, OutputError or
+// Moves a finished run by a fit. It reads trajectory.tum and what else can be moved of the run
+// folder, and writes all of it, moved, to another folder. Throws InputError, OutputError or
 // ConfigError, and Stopped where the user stops it: the folder of the result is as it was.
 [[nodiscard]] GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& request, Log& log,
                                                      const ProgressSink& progress = {});

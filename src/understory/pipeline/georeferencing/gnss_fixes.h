@@ -13,9 +13,9 @@
 
 namespace understory {
 
-// The fixes of a file: an NMEA log, an RTKLIB .pos file, a table with timestamp, latitude_deg and
-// longitude_deg (gnss.csv of a run or of a folder of clouds), or any recording. Those without a
-// position are left out. Throws InputError where there are none.
+// The fixes of a file: an NMEA log, an RTKLIB .pos file, a table, or any recording. A table has
+// timestamp, latitude_deg and longitude_deg, as gnss.csv of a run or of a folder of clouds. Those
+// without a position are left out. Throws InputError where there are none.
 [[nodiscard]] std::vector<GnssFix> read_fixes(const std::string& file, Log& log);
 
 // The fixes that a method places a run by: those of --gnss, else of a run that is being mapped,

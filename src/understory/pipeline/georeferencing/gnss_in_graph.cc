@@ -70,8 +70,8 @@ void describe(ConfigTable& table, GnssUseConfig& config) {
       {{"georeference", GnssUse::kGeoreference},
        {"rigid", GnssUse::kRigid},
        {"fuse", GnssUse::kFuse}},
-      "georeference: fixes lay the finished map on the globe, by the best method; rigid: the same "
-      "by split; fuse: they correct the path in the graph");
+      "georeference: fixes lay the finished map on the globe, by the best method. rigid: the same "
+      "by split. fuse: they correct the path in the graph");
   table.section("fusion", [&] { describe(table, config.path); });
 }
 

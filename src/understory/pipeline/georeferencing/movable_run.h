@@ -30,8 +30,9 @@ struct MovableRun {
   bool has_trees = false;
   std::vector<TreeFall> falls;
   bool has_falls = false;
-  // Where it lies already: the place of the frame east, north, up that `enu_from_world` leads to
-  // (the identity where the run's own frame is that frame). Nothing where it is not known.
+  // Where the run lies already: the place of the frame east, north, up that `enu_from_world` leads
+  // to. That transform is the identity where the run's own frame is that frame. Nothing where it is
+  // not known.
   std::optional<GeodeticPlace> origin;
   Pose enu_from_world;
   std::vector<GnssFix> fixes;  // of a run that is being mapped; else in its gnss.csv

@@ -17,8 +17,8 @@ struct RunLayers {
   ProgressSink progress = {};  // polled by each point that is read
 };
 
-// Writes what a run folder holds of map.laz, map.copc.laz, obstacles.laz and the rasters to
-// another, moved: clouds point by point, the rasters over cells of their own size, north up in the
+// Writes what a run folder holds of map.laz, map.copc.laz, obstacles.laz and the rasters to another
+// folder, moved. Clouds move point by point; rasters keep their cell size and lie north up in the
 // new frame. A point of a layer goes back to the world frame of its run. `target_from_world` leads
 // from there to the world frame of the result, and to its layers. The cloud is drawn into
 // `picture`, in the frame `drawing` of the result. Throws InputError or OutputError.

@@ -19,7 +19,7 @@
 namespace understory {
 
 // The online georeference of a run: an OnlineGeoreference from the first fix after the first scan
-// on, and a file in the work folder of what it said at each scan. Not thread-safe.
+// on. A file in the work folder notes what it said at each scan. Not thread-safe.
 class OnlinePath : public Resumable {
  public:
   explicit OnlinePath(const std::filesystem::path& work) : work_(work) {}

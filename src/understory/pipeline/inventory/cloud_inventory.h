@@ -31,10 +31,9 @@ struct InventoryRequest {
 };
 
 // From a point cloud to the run folder. Of a run's map the results are in the frames of the run:
-// trees.csv in its world frame, the layers in its coordinate system.
-// Writes ground, trees, rasters, report. Throws InputError where the cloud cannot be read or is
-// neither in metres nor upright, OutputError, and Stopped where the user stops it: the folder is as
-// it was.
+// trees.csv in its world frame, the layers in its coordinate system. Writes ground, trees, rasters,
+// report. Throws InputError where the cloud cannot be read or is neither in metres nor upright,
+// OutputError, and Stopped where the user stops it. The folder is then as it was.
 [[nodiscard]] RunOutcome run_inventory(const InventoryRequest& request, Log& log,
                                        const ProgressSink& progress);
 

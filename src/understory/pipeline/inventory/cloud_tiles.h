@@ -30,8 +30,8 @@ struct TilePoint {
   double gps_time = 0.0;
 };
 
-// A cloud sorted into square cells in a scratch file, and a tile of several cells as the part of it
-// that an inventory holds at a time. Points of a cell stay in the order in which they were added.
+// A cloud sorted into square cells in a scratch file. A tile is the part of it that an inventory
+// holds at a time: several cells. Points of a cell stay in the order in which they were added.
 class CloudTiles : public TiledCloud {
  public:
   // `folder` exists. `extent_m`: of the cloud, about: the cells become larger for a large one.

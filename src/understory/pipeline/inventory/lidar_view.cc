@@ -33,8 +33,8 @@ std::array<double, LidarView::kSectors> LidarView::no_returns() {
 
 void LidarView::add(const std::vector<KeyframePoint>& points) {
   const Pose lidar_from_body = body_from_lidar.inverse();
-  // Points that are surely lower than another of their sector are left out by their slope: most of
-  // them without looking for the sector, as they are lower than what every sector has.
+  // Points that are surely lower than another of their sector are left out by their slope. Most are
+  // lower than what every sector has, so their sector is not looked up.
   std::array<double, kSectors> steepest{};
   steepest.fill(-std::numeric_limits<double>::infinity());
   double everywhere = -std::numeric_limits<double>::infinity();

@@ -43,8 +43,8 @@ struct LidarView {
 [[nodiscard]] LidarViewFigures figures_of(const LidarView& view);
 [[nodiscard]] Lookouts seen_in_run(const std::filesystem::path& run);
 
-// Where the body of the carrier was at the poses, metres, world frame; and at the keyframes of a
-// run folder, nothing where it has none.
+// Where the body of the carrier was at the poses, metres, world frame. The second gives the
+// keyframes of a run folder, or nothing where it has none.
 [[nodiscard]] std::vector<Eigen::Vector3d> places_of(const std::vector<Pose>& world_from_body);
 [[nodiscard]] std::vector<Eigen::Vector3d> places_in_run(const std::filesystem::path& run);
 

@@ -40,10 +40,10 @@ struct StreamedCloud {
   bool has_intensity = false;
 };
 
-// Reads a cloud once and sorts it into tiles: nothing where it fits into the memory, or is of a
-// format that is read as a whole (PLY, PCD). First `change` is made, if there is one, then the
-// moves one after the other. Throws InputError as read_cloud does, OutputError where the disk has
-// no room, ConfigError where tiles have no room in the memory. Polls `progress`.
+// Reads a cloud once and sorts it into tiles. Gives nothing where it fits into the memory, or its
+// format is read as a whole (PLY, PCD). First `change` is made, if there is one, then the moves one
+// after the other. Throws InputError as read_cloud does, OutputError where the disk has no room,
+// ConfigError where tiles have no room in the memory. Polls `progress`.
 [[nodiscard]] std::optional<StreamedCloud> stream_cloud(const std::string& path,
                                                         const CloudTiling& tiling,
                                                         const PlaceChange& change,

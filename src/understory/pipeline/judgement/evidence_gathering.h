@@ -9,8 +9,8 @@
 
 namespace understory {
 
-// What both front ends know of the recording that they have read: what each sensor said, what of it
-// was put in order, dropped or not used, and what was damaged.
+// What both front ends know of the recording that they have read: what each sensor said, and what
+// was damaged. They count what was put in order, dropped or not used.
 struct ReadingFacts {
   const Recording* source = nullptr;
   const EventOrderer::Report* time_repair = nullptr;
@@ -22,8 +22,8 @@ struct ReadingFacts {
 void gather_reading(const ReadingFacts& facts, RunEvidence& evidence);
 
 // What the front end found out about the IMU. It says whether the accelerations by matching are
-// those of the accelerometer, how long it could not be gone by, and whether it was left out at the
-// end.
+// those of the accelerometer, and for how long they were not. It also says whether the IMU was left
+// out at the end.
 void gather_imu_trust(const ImuTrust& trust, RunEvidence& evidence);
 
 }  // namespace understory

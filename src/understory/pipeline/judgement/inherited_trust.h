@@ -15,9 +15,8 @@ struct InheritedTrust {
 };
 
 // Reads `status` and `reasons` of RUN/run.json, where `run` is a run folder or a file in one. A
-// run.json that cannot be read makes the result untrusted. So does a missing one if `run` is a
-// folder and one is `expected` there, or the folder holds a trajectory that is no simulator's
-// truth.
+// run.json that cannot be read makes the result untrusted. A missing one does so, too, if `run` is
+// a folder and one is `expected` there, or if its trajectory is no simulator's truth.
 [[nodiscard]] InheritedTrust trust_of_run(const std::filesystem::path& run, bool expected = false);
 
 // Lowers `status` to that of the run and adds its reasons in front of the others, each once.

@@ -15,14 +15,13 @@ struct LastStamps {
   TimeNs scan_end = 0;
 };
 
-// At the end of a recording: warns of what only its whole can show, no IMU at all, an IMU that
-// stopped, points without a return. `name` is that of the recording, `repair` what was done to its
-// stamps.
+// At the end of a recording, warns of what only the whole shows: no IMU, an IMU that stopped,
+// points without a return. `name` is that of the recording, `repair` what was done to its stamps.
 void remark_on_input(const LastStamps& last, const Recording& source,
                      const EventOrderer::Report& repair, const std::string& name, Log& log);
 
-// Warns of sensors that the extrinsics put more than 10 m from the body's origin or from the lidar:
-// millimetres taken for metres, or a place on the earth.
+// Warns of sensors that the extrinsics put more than 10 m from the body's origin or from the lidar.
+// Millimetres are then taken for metres, or a place on the earth is given.
 void remark_on_lever_arms(const Rig& rig, const std::string& name, Log& log);
 
 }  // namespace understory

@@ -39,7 +39,7 @@ struct JudgementConfig {
   double max_imu_scale = 1.1;
   int min_imu_windows = 60;          // fewer tell nothing, nor does
   double min_imu_spread_m_s2 = 0.2;  // an even motion
-  // The same accelerations have nothing to do with each other: their correlation is less, and they
+  // Where accelerations have nothing to do with each other, their correlation is less. They also
   // differ by more than matching is uncertain (2 cm of a scan make 0.4 m/s^2).
   double min_imu_correlation = 0.7;
   double max_imu_scatter_m_s2 = 0.8;

@@ -8,10 +8,10 @@
 
 namespace understory {
 
-// Follows how well scans fit the map, in windows of two seconds. It notes where scans find few of
-// their points in it, and where the points that they find lie no nearer than chance would put them.
-// The first ten seconds do not count: the map is a few scans then. Memory: 40 bytes a window. Not
-// thread-safe.
+// Follows how well scans fit the map, in windows of two seconds. It notes where few points of a
+// scan find the map. It also notes where those that find it lie no nearer than chance would put
+// them. The first ten seconds do not count: the map is a few scans then. Memory: 40 bytes a window.
+// Not thread-safe.
 class MatchCourse {
  public:
   // Reach of the matcher, see Matcher::reach_m: of cells it is the edge of the finest ones. A point

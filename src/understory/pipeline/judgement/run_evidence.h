@@ -23,8 +23,8 @@ struct SensorEvidence {
   std::uint64_t clock_jumps = 0;  // stamps shifted from there on
   double longest_gap_s = 0.0;
   std::string after_longest_gap;  // stamp of the message that ended it, seconds
-  // How long the sensor was not used although it belongs to the recording: it began late, stopped,
-  // was silent, or was not used; and why, in words.
+  // How long the sensor was not used although it belongs to the recording, and why, in words. It
+  // may have begun late, stopped, been silent, or been left out.
   double unused_s = 0.0;
   std::string unused_why;
   // How long another sensor went on after the last message of this one, and which, in words.

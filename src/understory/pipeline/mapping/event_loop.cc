@@ -56,7 +56,7 @@ void EventLoop::begin() {
   expect_imu();
   if (const auto* dense = std::get_if<DenseMappingConfig>(&asked_))
     expect_memory(*dense, request_.traits);
-  state_.forget_former();
+  state_.forget_unfinished_run();
   adapt_to_recording();
   save_state();  // makes the run resumable from the start
 }
@@ -255,8 +255,8 @@ bool EventLoop::start_over_for_refined_imu() {
   if (!found) return false;
   log_.forget_all_but("");
   log_.info(
-      fmt::format("the recording is mapped again from its beginning, with place and clock of the "
-                  "IMU as it tells them itself (its stamps are {:.1f} ms late)",
+      fmt::format("the recording is mapped again from its beginning, with the refined place and "
+                  "clock of the IMU. Its stamps are {:.1f} ms late",
                   1e3 * found->late_s));
   ++conditions.imu_refinements;
   conditions.imu_refined = found;

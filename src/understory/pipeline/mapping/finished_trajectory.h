@@ -21,8 +21,8 @@ struct FinishedScan {
 // them. Between two keyframes a scan keeps its odometry from the first one. What the second graph
 // moved the second keyframe against that odometry is spread over the scans between. It goes by
 // powers of the correction, in proportion to time (P0 (19)). Nothing is spread over the way to a
-// keyframe that begins a piece of map: its scan is where it is, those before belong to the piece
-// before.
+// keyframe that begins a piece of map. Its scan keeps its place, and those before belong to the
+// piece before.
 void for_each_finished_scan(const Journal& journal, const std::vector<Keyframe>& keyframes,
                             const std::function<void(const FinishedScan&)>& visit);
 

@@ -68,8 +68,8 @@ class FrontEnd : public Resumable {
   [[nodiscard]] virtual TimeNs first_scan() const = 0;
   // What was positioned with an IMU that is not trusted is better done again without it.
   [[nodiscard]] virtual ImuFinding imu_finding() const = 0;
-  // Place and clock of the IMU that the scans so far tell, where they differ from those that they
-  // were positioned with and this is to be mended.
+  // Place and clock of the IMU that the scans so far tell. Nothing where they are those in use, or
+  // are not to be corrected.
   [[nodiscard]] virtual std::optional<RefinedImu> refined_imu() const { return std::nullopt; }
   [[nodiscard]] virtual FrontEndProgress progress() const = 0;
 

@@ -8,12 +8,13 @@
 
 namespace understory {
 
-// run.json and report.html of a run of `understory map`, with what both front ends say alike:
-// configuration, inputs, title, and how far it kept up with its sensors. `times` must outlive it.
+// run.json and report.html of a run of `understory map`, with what both front ends share. That is
+// configuration, inputs, title, and how far the run kept up with its sensors. `times` must outlive
+// it.
 [[nodiscard]] RunDocuments map_documents(const ReadRecording& recording, const StageTimes& times);
 
-// Figures of the check of the IMU's clock, and a warning where clock or axes do not seem to be what
-// the run takes them for. Nothing where there is no check.
+// Figures of the check of the IMU's clock, and a warning where clock or axes seem to be others than
+// the run assumes. Nothing where there is no check.
 void tell_imu_clock(const std::optional<ClockCheckResult>& check, Log& log, RunSummary& summary);
 
 }  // namespace understory

@@ -17,9 +17,9 @@
 namespace understory {
 
 // Plays a recording at the speed of its sensors: `next` gives an event only once its time has come.
-// Each stream is played by its own clock, counted from its first event, which comes when it stands
-// in the recording: so clocks may run years apart. A clock that jumps is followed, and a gap of
-// more than `kLongestWait` is not waited for. Events wait in a queue that holds at most `max_scans`
+// Each stream is played by its own clock, counted from its first event, which comes at its place in
+// the recording. So clocks may run years apart. A clock that jumps is followed, and a gap of more
+// than `kLongestWait` is not waited for. Events wait in a queue that holds at most `max_scans`
 // scans. When one more arrives, the oldest waiting scan is dropped and counted, as a sensor driver
 // would. IMU and GNSS events are never dropped. One consumer thread.
 class RealtimePlayer : public Recording {

@@ -18,8 +18,8 @@ namespace understory {
 struct UnfinishedRun;
 
 // The state of a run in progress, by either front end. It is the files of the session and the two
-// newest checkpoints in the work folder of the run folder, which is claimed for as long. Gone when
-// the run is finished.
+// newest checkpoints, in the work folder of the run folder. The run claims that folder until it
+// ends. Gone when the run is finished.
 //
 // A power cut at any moment costs what came after the last checkpoint. What a checkpoint counts on
 // is on the disk before it, and it is there before the one before the last is gone. Each record of
@@ -38,9 +38,9 @@ class RunState {
   // they are not those that it was begun with.
   void check_inputs(const MappingRequest& request);
 
-  // Forgets the state of an unfinished run that this one replaces: once the recording is open, so
-  // that one that cannot be read takes no unfinished run away.
-  void forget_former() const { folder_.forget_state(); }
+  // Forgets the state of an unfinished run that this one replaces. It comes after the recording is
+  // opened: one that cannot be read costs no unfinished run.
+  void forget_unfinished_run() const { folder_.forget_state(); }
 
   [[nodiscard]] const RunFolder& folder() const { return folder_; }
   [[nodiscard]] std::filesystem::path work() const { return folder_.work(); }
@@ -51,12 +51,12 @@ class RunState {
   // Events that the checkpoint has behind it; 0 at the start.
   [[nodiscard]] std::uint64_t events() const { return events_; }
   [[nodiscard]] TimeNs last_checkpoint() const { return last_checkpoint_; }
-  // Seconds that the run has taken so far: since this part of it began, and those of the parts
-  // before up to the checkpoint that each was resumed from.
+  // Seconds that the run has taken so far. A resumed run also counts the parts before, each up to
+  // the checkpoint from which the next one resumed.
   [[nodiscard]] double elapsed_s() const;
 
-  // Brings a recording that was opened just now to where the checkpoint's run had read it: at once
-  // where the recording could tell its place, else by reading up to there.
+  // Brings a recording that was just opened to where the checkpoint's run had read it. It jumps
+  // there where the recording could tell its place, else it reads up to there.
   void find_place(Recording& source) const;
   // Brings session, orderer and log to the state of the checkpoint; a warning where it is not the
   // newest (key "run.older_checkpoint").

@@ -31,7 +31,7 @@ void put_traits(BinaryWriter& writer, const SensorTraits& traits);
 
 // Reads `source` up to its tenth scan that is not empty, and tells what its sensors are like. What
 // is handed back gives all events of `source`, those read included. A full scan has as many returns
-// as the second fullest of the ten: the first ones may be parts of a revolution or see little, and
+// as the second fullest of the ten. The first ones may be parts of a revolution or see little, and
 // one may be two in one. Where no scan comes for long, the traits are unknown. Throws what reading
 // throws.
 [[nodiscard]] std::unique_ptr<Recording> learn_traits(std::unique_ptr<Recording> source,

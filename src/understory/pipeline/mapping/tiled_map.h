@@ -10,8 +10,8 @@
 
 namespace understory {
 
-// The finished map of a run as the inventory takes it: in one piece where that has room, else in
-// tiles that are made of those of the map. World frame, metres.
+// The finished map of a run as the inventory takes it. It comes in one piece where that fits into
+// the memory, else in tiles made of the map's own. World frame, metres.
 class TiledMap : public TiledCloud {
  public:
   // `tiles` outlives this, and gets no more points. `most_bytes`: that the inventory may take; 0:

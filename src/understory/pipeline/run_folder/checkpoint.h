@@ -25,9 +25,9 @@ struct Checkpoint {
 [[nodiscard]] std::filesystem::path checkpoint_file(const std::filesystem::path& work,
                                                     std::uint64_t number);
 
-// Writes one in the place of the one before the last, so that at any moment, whatever happens, the
-// last one is whole: temporary file, synced, renamed, folder synced before and after. What it
-// counts on has to be on the disk already. Throws OutputError.
+// Writes a checkpoint in the place of the one before the last, so that the last one is whole at any
+// moment. A temporary file is synced and renamed, and the folder is synced before and after. What
+// it counts on has to be on the disk already. Throws OutputError.
 void write_checkpoint(const std::filesystem::path& work, std::uint64_t number,
                       const std::string& bytes);
 

@@ -9,9 +9,9 @@ namespace understory {
 struct InputIdentity {
   std::string what;  // "the recording", "the extrinsics"
   std::string path;  // as given
-  std::string mark;  // of a file its size and checksums of its first and last MiB; of a folder
-                     // those of the names and sizes of all files in it, and of parts of a bag that
-                     // lie elsewhere; of a simulation those of the files that it is made of
+  std::string mark;  // of a file its size and checksums of its first and last MiB; of a simulation
+                     // those of its files. Of a folder those of the names and sizes of all its
+                     // files, and of a bag's parts elsewhere
 };
 
 // Throws InputError where it cannot be read.

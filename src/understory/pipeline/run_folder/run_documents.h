@@ -23,8 +23,8 @@ namespace understory {
 
 // run.json and report.html of a command at work. Every command that writes a folder of results has
 // one. It fills in what all commands have in common: command, version, configuration, inputs,
-// status and reasons, warnings, stages, wall time, CPU time and memory, and the frame of the
-// report. The command adds what is its own to `summary` and `report`. Not thread-safe.
+// status and reasons, and warnings. Stages, wall time, CPU time, memory and the frame of the report
+// are among it, too. The command adds what is its own to `summary` and `report`. Not thread-safe.
 class RunDocuments {
  public:
   // The wall time counts from here, or is what `elapsed_s` says: that of a resumed run has earlier
@@ -45,8 +45,8 @@ class RunDocuments {
   void add_inputs(const std::vector<InputHash>& files);
   // A number of things under "counts".
   void count(const std::string& name, std::uint64_t value);
-  // What a user has to know of the result and no part of the program has warned of before: under
-  // "warnings", beside those of the log, and in the report.
+  // Adds what a user has to know of the result and no part of the program has warned of before. It
+  // stands under "warnings", beside those of the log, and in the report.
   void remark(const std::string& key, const std::string& message);
   // Where the run lies on the globe, and the frame that its map is drawn in. `frames` must live
   // until `write`.
@@ -67,8 +67,8 @@ class RunDocuments {
   // and those of a run that is named later before those of a run that is named earlier.
   void inherit(const InheritedTrust& trust);
 
-  // Turns the files that hold world coordinates, where another frame than east, north, up is
-  // wanted, and writes report.html and then run.json to the folder: once, when all else is written.
+  // Writes report.html and then run.json to the folder, once, when all else is written. Before, it
+  // turns the files with world coordinates, where another frame than east, north, up is wanted.
   // Throws OutputError.
   void write(const std::filesystem::path& results);
   // After `write`: status, reasons, and a few lines for the terminal.

@@ -21,7 +21,7 @@ struct McapWriterOptions {
 };
 
 // Writes the project's native recording: MCAP with ROS 2 messages (CDR), chunks with CRC, message
-// and chunk indexes, statistics and a summary, on the topics /lidar, /imu, /mag, /gnss,
+// and chunk indexes, statistics and a summary. The topics are /lidar, /imu, /mag, /gnss,
 // /gnss/quality, /gnss/nmea, /gnss/second and /tf_static. A message's log time is its event_time (a
 // scan's is its end) unless another is given. Readers sort by it.
 //

@@ -28,9 +28,9 @@ namespace understory {
 // The files of a bag that its metadata.yaml names, that are there and that lie outside its folder.
 // None of what is no folder of a bag. Paths are absolute where the folder's is, or the name.
 [[nodiscard]] std::vector<std::string> bag_parts_outside(const std::string& path);
-// The files of the bag's folder one after the other, .db3 or .mcap, also with .zstd behind it
-// (those are unpacked while they are read); or one such file. A part that is damaged is read as far
-// as it goes, one that cannot be opened is left out with a warning.
+// The files of the bag's folder one after the other, .db3 or .mcap; or one such file. Those with
+// .zstd behind the name are unpacked while they are read. A part that is damaged is read as far as
+// it goes, one that cannot be opened is left out with a warning.
 [[nodiscard]] std::unique_ptr<MessageSource> read_ros2_bag(const std::string& path,
                                                            std::shared_ptr<UnpackedParts> unpacked,
                                                            Log& log);

@@ -299,7 +299,7 @@ class RosbagSource : public MessageSource {
     return "";
   }
 
-  // A chunk that seems to reach beyond the end of the file: either the file was cut off, or the
+  // A chunk that seems to reach beyond the end of the file. Either the file was cut off, or the
   // chunk's length is damaged and others follow. Returns how much of it may be read.
   std::uint64_t pass_cut_chunk(const Record& record) {
     const auto following = find_chunk(record.data_offset);

@@ -9,7 +9,7 @@
 namespace understory {
 
 // The unpacked copy of a file in zstd's format. It lies without a name in the folder for temporary
-// files (TMPDIR, else /tmp), so that it goes with its last reader, however the program ends.
+// files (TMPDIR, else /tmp). So it goes with its last reader, however the program ends.
 class UnpackedFile {
  public:
   // What is damaged is unpacked as far as it goes. Throws InputError if the file cannot be opened,

@@ -19,13 +19,12 @@ namespace understory {
 
 // Turns Ouster lidar and IMU packets into scans and samples.
 //
-// Points are in Ouster's *sensor frame* (lidar_to_sensor_transform applied, which is what
-// ouster-sdk's XYZLut gives without further extrinsics): x away from the connector, z up, origin at
-// the centre of the base; metres. Order: column after column, in each from the top beam down. Rings
-// count from the lowest beam up. Intensity is the signal, in low data rate profiles the
-// reflectivity. t_ns is the column's time. Times are on the sensor's own clock: UTC or TAI if it is
-// synchronised, else since power-on.
-// Damaged packets are passed over with a warning ("recording.damaged"). Not thread-safe.
+// Points are in Ouster's *sensor frame*: x away from the connector, z up, origin at the centre of
+// the base; metres. lidar_to_sensor_transform is applied, as in ouster-sdk's XYZLut without further
+// extrinsics. Order: column after column, in each from the top beam down. Rings count from the
+// lowest beam up. Intensity is the signal, in low data rate profiles the reflectivity. t_ns is the
+// column's time. Times are on the sensor's own clock: UTC or TAI if it is synchronised, else since
+// power-on. Damaged packets are passed over with a warning ("recording.damaged"). Not thread-safe.
 class OusterDecoder {
  public:
   // `source` names the stream in warnings.

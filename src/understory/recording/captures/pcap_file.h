@@ -23,10 +23,10 @@ struct CapturedFrame {
   std::uint64_t position = 0;  // of its record in the file
 };
 
-// Reads pcap (micro- and nanoseconds, both byte orders) and pcapng files. Own code instead of
-// libpcap because that stops at the first damaged record: this one looks for the next record that
-// is followed by another plausible one, with a warning ("recording.damaged"). Memory is bounded by
-// the largest frame (256 KiB). Not thread-safe.
+// Reads pcap (micro- and nanoseconds, both byte orders) and pcapng files. The code is our own,
+// because libpcap stops at the first damaged record. This one warns ("recording.damaged") and looks
+// for the next record that is followed by another plausible one. Memory is bounded by the largest
+// frame (256 KiB). Not thread-safe.
 class PcapFile {
  public:
   // Throws InputError if the file does not begin as a capture does.

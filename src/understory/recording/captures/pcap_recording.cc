@@ -271,10 +271,9 @@ std::unique_ptr<PcapRecording> open(std::unique_ptr<ByteSource> source, const Op
   if (!beside.metadata) {
     throw InputError(
         name, "",
-        "expected packets of a Velodyne, Hesai or Livox, or of an Ouster with its "
-        "metadata (--metadata FILE, or a .json beside it whose name begins that of the "
-        "capture); found " +
-            survey.list());
+        "expected packets of a Velodyne, Hesai, Livox or Ouster; found " + survey.list() +
+            ". An Ouster needs its metadata (--metadata FILE, or a .json beside the capture whose "
+            "name begins that of the capture)");
   }
   const auto lidar = choose(survey, options, name, log,
                             [](const PcapSurvey::Stream& stream) { return stream.ouster; });

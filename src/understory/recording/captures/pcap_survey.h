@@ -9,8 +9,8 @@
 
 namespace understory {
 
-// Where datagrams come from and go to. Sensors of one maker leave the works with the same address:
-// those that share one are told apart by the address of the link layer, if the capture has it.
+// Where datagrams come from and go to. Some sensors of one maker leave the works with the same
+// address. Those are told apart by the address of the link layer, if the capture has it.
 struct UdpStream {
   std::uint64_t device = 0;  // as in Datagram
   std::uint32_t source = 0;
@@ -71,8 +71,8 @@ struct PcapSurvey {
   [[nodiscard]] bool trust_checksums() const { return good_checksums > 10 * bad_checksums; }
   // What lidars there are whose packets are not read; empty: none.
   [[nodiscard]] std::string unread() const;
-  // Of a stream: with its address where other lidars send to the same port, and with that of the
-  // link layer where they have the same address.
+  // The name of a stream. It has the address where other lidars send to the same port, and that of
+  // the link layer where they share the address.
   [[nodiscard]] std::string name_of(const UdpStream& key) const;
   // For messages: "1500 frames: udp 7502: 192 x 8448 bytes, ..."
   [[nodiscard]] std::string list() const;
@@ -93,8 +93,8 @@ struct PcapWanted {
   std::string stream;                  // "udp 2368"; empty: any
 };
 
-// Looks at 20 000 frames from where the file stands, and if the lidar is not among them, at as many
-// behind its first packet, wherever in the file that is.
+// Looks at 20 000 frames from where the file stands. If the lidar is not among them, it looks at as
+// many behind the lidar's first packet.
 [[nodiscard]] PcapSurvey survey_pcap(PcapFile& file, const PcapWanted& wanted);
 
 // The path of the only .json file beside a capture that belongs to it; empty if there is none. Its

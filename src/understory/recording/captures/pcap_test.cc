@@ -356,8 +356,8 @@ TEST(Pcap, TellsSensorsOfOneAddressApartByTheirLinkAddress) {
       << said;
 }
 
-// Lidars of two makers that share an address cannot be told apart where frames have none of their
-// own: the one with most packets is read, and that is said.
+// Lidars of two makers may share an address, and their frames may have none of their own. They
+// cannot be told apart: the one with most packets is read, with a warning.
 TEST(Pcap, SaysThatTwoMakersShareAnAddress) {
   Bytes file = make_capture();
   test::HesaiPacket hesai;

@@ -38,12 +38,11 @@ struct VelodyneConfig {
 // count from the lowest beam up. In dual-return packets the brighter return has return_index 0, the
 // other 1; where both are the same only one is kept.
 //
-// Absolute time: the packet's microseconds since the hour are joined with the hour of position
-// packets that have a valid fix, else of the `stamp` given with the packet. Where sensor clock and
-// stamp differ by more than a second (no GNSS at the sensor), the sensor's clock gives the
-// differences, and the stamps, smoothed, the offset.
-// Damaged packets, and those that come twice in a row, are passed over with a warning
-// ("recording.damaged_packet"). Not thread-safe.
+// Absolute time is the hour plus the packet's microseconds since the hour. The hour comes from
+// position packets with a valid fix, else from the `stamp` given with the packet. Sensor clock and
+// stamp may differ by more than a second (no GNSS at the sensor). The sensor's clock then gives the
+// differences, and the smoothed stamps give the offset. Damaged packets, and those that come twice
+// in a row, are passed over with a warning ("recording.damaged_packet"). Not thread-safe.
 class VelodyneDecoder {
  public:
   static constexpr std::size_t kDataPacketSize = 1206;
@@ -54,8 +53,8 @@ class VelodyneDecoder {
 
   // `stamp` is when the packet was received. Any bytes of any size are survived.
   void add_packet(const std::uint8_t* data, std::size_t size, TimeNs stamp);
-  // A position packet: the clock is set by it, and the fix in its NMEA sentence is given if it is a
-  // new and valid one.
+  // A position packet. It sets the clock, and the fix in its NMEA sentence is given if it is new
+  // and valid.
   std::optional<GnssFix> add_position_packet(const std::uint8_t* data, std::size_t size);
   // Joins a position packet's time of day with the data packets' clock. False if the packet has no
   // valid fix or the sensor is not locked to it.

@@ -15,8 +15,8 @@ namespace understory {
 class ByteSource;
 
 // A whole point cloud as a file holds it. Coordinates of point i in the file's frame (a coordinate
-// system, or the sensor's) are origin + points[i]: the origin in double takes up the large part, so
-// that floats keep tenths of a millimetre. All other columns are either empty or one per point.
+// system, or the sensor's) are origin + points[i]. The origin in double takes up the large part, so
+// floats keep tenths of a millimetre. All other columns are either empty or one per point.
 struct PointCloudFile {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3f> points;       // metres, relative to origin; finite

@@ -7,8 +7,8 @@
 
 namespace understory {
 
-// A folder of clouds (.pcd, .ply, .las, .laz, KITTI .bin) in the order of their names, or one such
-// file as a recording of one scan. In a folder imu.csv, gnss.csv and *.nmea are merged by time.
+// A folder of clouds (.pcd, .ply, .las, .laz, KITTI .bin) in the order of their names. One such
+// file is a recording of one scan. In a folder imu.csv, gnss.csv and *.nmea are merged by time.
 // Throws InputError if there is no cloud in it or the times are unusable.
 [[nodiscard]] bool is_cloud_folder(const std::string& path);
 [[nodiscard]] bool is_cloud_file(const std::string& path);

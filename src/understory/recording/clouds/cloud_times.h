@@ -25,9 +25,10 @@ struct CloudFileTimes {
                                               const std::vector<std::string>& names, double rate_hz,
                                               Log& log);
 
-// The time in a file's name without its extension: seconds with a fraction ("1583840261.0399"),
-// seconds and nanoseconds ("cloud_1583840261_039995392"), or one whole number of nano-, micro- or
-// milliseconds or seconds since 1970. Nothing for a bare counter.
+// The time in a file's name without its extension. It is seconds with a fraction
+// ("1583840261.0399"), or seconds and nanoseconds ("cloud_1583840261_039995392"). It may also be
+// one whole number of nano-, micro- or milliseconds or seconds since 1970. Nothing for a bare
+// counter.
 [[nodiscard]] std::optional<TimeNs> time_in_name(const std::string& stem);
 
 // Orders names with their numbers by value: scan_2 before scan_10.

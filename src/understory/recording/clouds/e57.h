@@ -30,8 +30,8 @@ struct E57Scan {
   std::uint64_t section = 0;  // that holds the points: its physical place
   std::vector<E57Field> fields;
 
-  // Distance of neighbouring numbers, in which its points of single precision are held at a place
-  // in the frame of the file, m; 0: they are in double precision or scaled.
+  // Distance of neighbouring numbers of single precision at a place in the frame of the file, m. 0:
+  // points are in double precision or scaled.
   [[nodiscard]] double step_at(const Eigen::Vector3d& position) const;
 };
 

@@ -116,8 +116,8 @@ void read_uncompressed(ByteSource& file, const LasHeader& header, Log& log,
   report_break(file, header, read, log);
 }
 
-// Shows LASzip a file whose header holds its own record alone, because LASzip frees what it has not
-// yet allocated when a record of a damaged header ends its reading. Points keep their places.
+// Shows LASzip a file whose header holds its own record alone. LASzip frees what it has not yet
+// allocated when a record of a damaged header ends its reading. Points keep their places.
 class CleanedFile : public ByteSource {
  public:
   explicit CleanedFile(ByteSource& file) : file_(file) {
@@ -140,8 +140,8 @@ class CleanedFile : public ByteSource {
     if (header[25] >= 3) std::memset(start_.data() + 227, 0, 8);
     if (header[25] >= 4) std::memset(start_.data() + 235, 0, 12);
     start_.insert(start_.end(), record.begin(), record.end());
-    // A table of chunks that a cut has taken away: LASzip does without if it is told that it was
-    // never written, which is a place of it before the first chunk.
+    // A cut has taken the table of chunks away. LASzip does without if the table's place lies
+    // before the first chunk: that means it was never written.
     table_at_ = points;
     file.read(points, sizeof(std::uint64_t), table_);
     if (table_.size() == sizeof(std::uint64_t) && get<std::uint64_t>(table_, 0) >= file.size())
@@ -349,8 +349,8 @@ struct Decoding {
   }
 };
 
-// LASzip reads and writes out of bounds on damaged data, so it decodes in a process of its own:
-// if that one ends early, what came before is kept.
+// LASzip reads and writes out of bounds on damaged data, so it decodes in a process of its own. If
+// that process ends early, what came before is kept.
 void read_compressed(ByteSource& file, const LasHeader& header, Log& log,
                      const std::function<void(const LasPoint&)>& visit) {
   static_assert(std::is_trivially_destructible_v<LasPoint>);

@@ -16,8 +16,8 @@ namespace understory {
 // ascend. Axes are brought to unit length.
 //
 // Throws InputError with the line where a cell is no number, a position is missing or absurd, or an
-// axis is no direction. So it does where a size or a variance is negative, order is broken, or the
-// gzip stream is damaged, and where there is no row at all.
+// axis is no direction. So it does where a size or a variance is negative, or order is broken. The
+// same holds for a damaged gzip stream and a file without rows.
 [[nodiscard]] std::vector<StemView> read_stem_views(const std::filesystem::path& path, Log& log);
 
 }  // namespace understory

@@ -229,7 +229,7 @@ class MergedLidars : public Recording {
     // Without scans for a second, the others go on.
     const TimeNs since = lidar.first ? lidar.end : begin_.value_or(merger_.begin());
     if (since != ScanMerger::kForever && stream_.passed() > kSilence)
-      merger_.hear(0, since + stream_.passed() - kSilence);
+      merger_.set_complete_until(0, since + stream_.passed() - kSilence);
   }
 
   // Reads another lidar up to its next scan.
@@ -267,7 +267,7 @@ class MergedLidars : public Recording {
 
   void end(std::size_t number) {
     lidars_[number].ended = true;
-    merger_.hear(number, ScanMerger::kForever);
+    merger_.set_complete_until(number, ScanMerger::kForever);
   }
 
   void finish() {

@@ -37,7 +37,7 @@ void ScanMerger::add(std::size_t number, ScanPtr scan) {
   lidar.scans.push_back(std::move(scan));
 }
 
-void ScanMerger::hear(std::size_t lidar, TimeNs until) {
+void ScanMerger::set_complete_until(std::size_t lidar, TimeNs until) {
   lidars_[lidar].heard = std::max(lidars_[lidar].heard, until);
 }
 

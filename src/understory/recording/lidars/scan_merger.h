@@ -14,9 +14,9 @@ namespace understory {
 
 // Cuts the points of several lidars into common scans. Each lidar turns at its own rate. A common
 // scan begins where a scan of the first lidar does. While that is silent, scans follow each other
-// after the same time as before. A common scan holds all points of its time, in the frame of the
-// first lidar, in order of time where each lidar gives them so. Rings of lidar i count from i
-// times kRingsALidar. Not thread-safe.
+// after the same time as before. A common scan holds all points of its time in the frame of the
+// first lidar. They are in order of time where each lidar gives them so. Rings of lidar i count
+// from i times kRingsALidar. Not thread-safe.
 class ScanMerger {
  public:
   explicit ScanMerger(std::size_t lidars) : lidars_(lidars) {}
@@ -26,7 +26,7 @@ class ScanMerger {
   // A scan of a lidar, on the common clock.
   void add(std::size_t lidar, ScanPtr scan);
   // All points of the lidar before `until` have been added.
-  void hear(std::size_t lidar, TimeNs until);
+  void set_complete_until(std::size_t lidar, TimeNs until);
 
   // What comes next: a scan, or the lidar of which more has to be known first, or the end.
   struct Step {

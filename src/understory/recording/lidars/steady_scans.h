@@ -9,9 +9,9 @@
 
 namespace understory {
 
-// Passes the scans of a lidar on, but for single ones with a stamp far from those around them: one
-// of them would have all others of the machine wait for its time. A stamp that is ten seconds off
-// counts once the next one confirms it. Not thread-safe.
+// Passes the scans of a lidar on, but for single ones with a stamp far from those around them. The
+// scans of all other lidars would wait for such a time. A stamp that is ten seconds off counts once
+// the next one confirms it. Not thread-safe.
 class SteadyScans {
  public:
   // The scans that are certain now, in order.

@@ -20,12 +20,12 @@ struct HeadingByPositions {
 // Headings by the positions of two antennas on one carrier, and whether the distance between the
 // positions is that of the antennas.
 //
-// A pair whose distance is far off tells no heading. The standard deviation comes from both
-// covariances, across the line, or from the scatter of the distances about that of the antennas, if
-// that is larger. Receivers under trees promise too much, and errors across the line are as large
-// as those along it. Errors that both antennas share cancel, and the covariances do not tell which
-// they are: then a heading is better than it says. Where the distances scatter by too much, those
-// that are right are so by chance, and no pair tells a heading.
+// A pair whose distance is far off tells no heading. The standard deviation across the line comes
+// from both covariances. The scatter of the distances about that of the antennas replaces it, if
+// larger. Receivers under trees promise too much, and errors across the line are as large as those
+// along it. Errors that both antennas share cancel, and the covariances do not tell which they are:
+// then a heading is better than it says. Where the distances scatter by too much, those that are
+// right are so by chance, and no pair tells a heading.
 //
 // Deterministic; not thread-safe.
 class BaselineHeadings {
@@ -37,8 +37,8 @@ class BaselineHeadings {
   [[nodiscard]] double length_m() const { return length_m_; }
 
   // Of two fixes of one moment. Nothing without a position or a height, where the distance is
-  // wrong, where too few were seen to know how they scatter, and for a line steeper than 60
-  // degrees.
+  // wrong, or for a line steeper than 60 degrees. Nothing, too, while too few pairs were seen to
+  // know their scatter.
   [[nodiscard]] std::optional<HeadingByPositions> add(const GnssFix& first, const GnssFix& second);
 
   [[nodiscard]] std::uint64_t pairs() const { return pairs_; }

@@ -31,8 +31,8 @@ class CloudTopic {
   }
   // Whether its scans are those of several lidars, merged (kRingsALidar).
   void know_merged(bool merged) { merged_ = merged; }
-  // What the first seconds tell of a Livox (`lidar` may be null or another sensor): its model, and
-  // where its IMU is, if both have one frame. Warns where the place is not known.
+  // What the first seconds tell of a Livox: its model, and where its IMU is, if both have one
+  // frame. `lidar` may be null or another sensor. Warns where the place is not known.
   void know_livox(const TopicSurvey* lidar, SensorPlaces& places, TransformTree& transforms);
   // Whether a message is of another Livox than the one that is used; then it is counted as left
   // out.

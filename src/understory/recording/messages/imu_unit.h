@@ -8,7 +8,7 @@
 namespace understory {
 
 // The unit of an IMU's accelerations. Drivers that give multiples of gravity are told from m/s^2 by
-// the mean over the first seconds, which no carrier keeps at a tenth of gravity.
+// the mean over the first seconds. No carrier keeps that at a tenth of gravity.
 class ImuUnit {
  public:
   // By the mean specific force of the first samples. True if it is g.

@@ -135,8 +135,8 @@ std::optional<PointCloud2Message> decode_point_cloud2(MessageReader reader) {
 }
 
 // The last point of a CDR sequence lacks the padding that follows the others. So the cloud begins
-// one byte before its first point, where the sequence has its length, and its fields lie one byte
-// later: then every point has its whole step.
+// one byte before its first point, at the length of the sequence. Its fields lie one byte later,
+// and every point has its whole step.
 std::optional<LivoxMessage> decode_livox(MessageReader reader) {
   LivoxMessage message;
   PointCloud2Message& cloud = message.cloud;

@@ -81,8 +81,8 @@ class MessageMerger {
     return all;
   }
   // Passes over the messages that had been given of a block that was added once more. False if it
-  // has no message behind them, or another number than before: a channel that is described only
-  // behind the block is known when it is read again.
+  // has no message behind them, or another number than before. A channel that is described only
+  // behind the block is known when the block is read again.
   [[nodiscard]] bool pass(const Progress& progress) {
     if (blocks_.empty() || blocks_.back().block.place != progress.place ||
         blocks_.back().block.entries.size() != progress.of || progress.given >= progress.of)

@@ -45,8 +45,8 @@ class MessageReader {
   // A sequence of bytes with its length.
   [[nodiscard]] ByteSpan byte_sequence() { return body_.take(get<std::uint32_t>()); }
   [[nodiscard]] ByteSpan take(std::size_t count) { return body_.take(count); }
-  // The length of a sequence whose elements take at least `element_size` bytes; 0 (and not ok) if
-  // that many elements cannot be there, so that a damaged length allocates nothing.
+  // The length of a sequence whose elements take at least `element_size` bytes. It is 0 (and not
+  // ok) if so many cannot be there: a damaged length allocates nothing.
   [[nodiscard]] std::uint32_t length(std::size_t element_size) {
     const auto count = get<std::uint32_t>();
     if (count > body_.remaining() / element_size) {

@@ -136,8 +136,8 @@ TEST(MessageRecording, JoinsHeadingsToThePositionsOfTheirEpoch) {
   EXPECT_FALSE(recording->rig().body_from_second_gnss);
 }
 
-// Two receivers at 5 Hz on a carrier that goes north-east at 2 m/s, the second one 90 ms later and
-// a metre to the north-west of the first: their line leads to 315 degrees.
+// Two receivers at 5 Hz on a carrier that goes north-east at 2 m/s. The second is 90 ms later and a
+// metre north-west of the first: their line leads to 315 degrees.
 struct TwoReceivers {
   std::string first_frame = "gps";
   std::string second_frame = "gps_left";

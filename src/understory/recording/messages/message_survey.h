@@ -63,8 +63,8 @@ struct MessageSurvey {
   [[nodiscard]] const TopicSurvey* find(const std::string& topic) const;
 };
 
-// Reads the start of a recording: until there are enough clouds to judge their conventions and two
-// seconds have passed, never more than a minute or 256 MB.
+// Reads the start of a recording until two seconds have passed and the clouds suffice to judge
+// their conventions. It never reads more than a minute or 256 MB.
 [[nodiscard]] MessageSurvey survey_messages(MessageSource& source);
 
 // Adds the topics of sensors that begin later: name, role and frame, and that they are late. They

@@ -174,7 +174,7 @@ struct TimeRange {
 };
 
 // Makes the scan begin at its first point. Where that lies just behind the header stamp, the stamp
-// itself is kept: it is the start of the revolution, in which the first beams may have missed.
+// itself is kept. It is the start of the revolution, in which the first beams may have missed.
 // Until now the points hold the last 32 bits of their times relative to the header stamp.
 void count_from_first(const TimeRange& times, TimeNs header, Scan& scan) {
   const bool keep = times.first >= 0 && times.first <= (times.last - times.first) / 4;

@@ -31,9 +31,9 @@ class SensorPlaces {
   // Why the IMU cannot be used, for a warning: its place is not known. Empty: it is.
   [[nodiscard]] std::string why_no_imu() const;
   // From one antenna to the other, metres; nothing where the place of one is not known. The origin
-  // of the body is no antenna by its frame alone: filters state their positions there.
-  // And a file that places the antennas means topics that are named: otherwise the busier one is
-  // the first, and a line that is taken the wrong way round turns the map by 180 degrees.
+  // of the body is no antenna by its frame alone: filters state their positions there. A file that
+  // places the antennas means topics that are named. Without names the busier one is the first, and
+  // a line the wrong way round turns the map by 180 degrees.
   [[nodiscard]] std::optional<double> antenna_distance_m(bool first_is_named) const;
   // Why there is none, for a warning.
   [[nodiscard]] std::string why_no_second_antenna(bool first_is_named) const;

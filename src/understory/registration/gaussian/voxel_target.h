@@ -25,7 +25,7 @@ namespace understory::internal {
   return rows;
 }
 
-// What VGICP and NDT from distribution to distribution share: a mean of the source meets the
+// What VGICP and NDT from distribution to distribution share. A mean of the source meets the
 // Gaussian of its voxel, in the metric of the sum of both covariances. `Method` derives from this
 // and adds source_of() and kExactGradient, see gaussian_match.h.
 class VoxelTarget {

@@ -10,9 +10,9 @@
 
 namespace understory {
 
-// A corner or an end of something, and what lies around it: a spin image (Johnson and Hebert,
-// Using Spin Images for Efficient Object Recognition, 1999, section 2) about the vertical. Levelled
-// frame of its cloud, metres.
+// A corner or an end of something, and what lies around it. The descriptor is a spin image about
+// the vertical (Johnson and Hebert, Using Spin Images for Efficient Object Recognition, 1999,
+// section 2). Levelled frame of its cloud, metres.
 struct LocalFeature {
   static constexpr std::size_t kRadii = 6;
   static constexpr std::size_t kHeights = 8;

@@ -64,7 +64,7 @@ inline constexpr float kFarthest = 2000.0F;
 inline constexpr std::size_t kMostPoints = 400000;
 // Range of a point over that of the nearest of its pixel: below, they are at one range [chosen]
 inline constexpr float kOneRange = 1.2F;
-// Share of the points at one range, and number of those that tell, of a single view: scans of 16 to
+// Share of the points at one range, and number of those that tell, of a single view. Scans of 16 to
 // 128 rings have 0.56 to 0.98, maps of six scans 0.52 and less [tuned: forest, handheld, evo1,
 // harvester and lohja1 seed 2, and the Newer College and KITTI scans]
 inline constexpr double kOneViewShare = 0.54;
@@ -127,8 +127,8 @@ inline constexpr float kHighest = 4.0F;
 inline constexpr float kAbove = 0.5F;
 // m: features are so far apart [chosen]
 inline constexpr double kSpacing = 0.5;
-// m: what tells corners and ends lies nearer; points of it at least; how far the mean lies from an
-// end, as a share of the first; narrow over wide variance of a corner [chosen]
+// m: points nearer than this tell corners and ends. Then: least number of them, distance of the
+// mean from an end as a share of the first, narrow over wide variance of a corner [chosen]
 inline constexpr float kNear = 1.5F;
 // The next of these [chosen]
 inline constexpr double kFewestAround = 12.0;
@@ -256,7 +256,7 @@ inline constexpr double kSameHeading = 0.07;
 
 namespace match_verdict {  // registration/global/match_verdict.cc
 // Weights of the logistic regression: constant, near, log of seen through over near, log of fine
-// over aside, log of matched over chance, gap to the rival [tuned: by
+// over aside. Then log of matched over chance, and gap to the rival [tuned: by
 // benchmarks/registration/fit_verdict.py on seeds 3 to 5]
 inline constexpr std::array<double, 6> kWeights = {-16.75, 12.16, -1.28, 5.45, 0.30, 2.00};
 // Floors of the shares in the logarithms [chosen: a few of 1500 points]

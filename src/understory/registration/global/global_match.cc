@@ -43,7 +43,7 @@ void refine_coarsely(const SearchCloud& target, const SearchCloud& source, const
   candidate.score = pose_score(target, source, candidate.target_from_source);
 }
 
-// Uprights tell no height, and where the ground is hidden its height is off by a metre: a match
+// Uprights tell no height, and where the ground is hidden the height is off by a metre. A match
 // that begins there tilts the source until some ground meets. Of several heights the one whose
 // match has the most voxels in common is taken.
 void try_heights(const SearchCloud& target, const SearchCloud& source, const Points& few,

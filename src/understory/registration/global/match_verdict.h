@@ -62,8 +62,8 @@ struct GlobalRegistration {
 using MatchFrom = std::function<RegistrationResult(const Pose& guess)>;
 
 // The match that a method makes from a guess, with its verdict. Where that is not trusted, the
-// method begins again at the best pose of a search without a guess, and that answer is taken if it
-// is trusted. The frames are those of the points; `found`: what search_poses gave for the clouds.
+// method begins again at the best pose of a search without a guess. That answer is taken if it is
+// trusted. The frames are those of the points; `found`: what search_poses gave for the clouds.
 [[nodiscard]] GlobalRegistration match_and_judge(const SearchCloud& target,
                                                  const SearchCloud& source, const Pose& guess,
                                                  const MatchFrom& match,

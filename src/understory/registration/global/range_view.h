@@ -14,9 +14,9 @@ class RangeView {
   // `points`: any frame, metres; `eye`: the place in that frame.
   RangeView(const Points& points, const Eigen::Vector3f& eye);
 
-  // Whether the points can have been seen from that place at one time: most points lie about as far
-  // as the nearest one of their pixel. A map, or a cloud in another frame, has them one behind the
-  // other.
+  // Whether the points can have been seen from that place at one time. Most points then lie about
+  // as far as the nearest one of their pixel. A map, or a cloud in another frame, has them one
+  // behind the other.
   [[nodiscard]] bool is_one_view() const { return one_view_; }
 
   // How a point in the same frame lies against what was seen.

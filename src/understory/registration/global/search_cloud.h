@@ -15,8 +15,8 @@
 
 namespace understory {
 
-// Which points of a voxel grid have a neighbour: tells in one look whether a place is within about
-// 0.6 m of a point of the cloud. Immutable, thread-safe.
+// Which points of a voxel grid have a neighbour. One look tells whether a place is within about 0.6
+// m of a point of the cloud. Immutable, thread-safe.
 class NearGrid {
  public:
   explicit NearGrid(const Points& points);

@@ -145,8 +145,8 @@ class ApartPoints {
   void mark_changed(Block& block, std::uint64_t cubes);
   void drop_cubes(Block& block, std::uint64_t cubes);
   void drop_block(std::uint32_t number);
-  // Calls act(number of the block, its cubes near `cube`, step to the block) for each block that
-  // may have something nearer than `least()`, the own one first.
+  // Calls act(number of the block, its cubes near `cube`, step to the block), the own block first.
+  // It does so for each that may have something nearer than `least()`.
   template <typename Least, typename Act>
   void for_each_near(const Place& cube, int reach, const Gaps& gaps, const Least& least,
                      const Act& act) const;

@@ -25,8 +25,8 @@ class IcpMap {
   static constexpr int kMaxReach = 4;
 
   [[nodiscard]] std::size_t size() const { return apart_ ? apart_->size() : spots_.size(); }
-  // What a search found for a point that moves step by step: as long as it stays within `slack_m`
-  // of where it was searched, no other point of the map can have become nearer.
+  // What a search found for a point that moves step by step. While it stays within `slack_m` of
+  // where it was searched, no other point of the map can be nearer.
   struct Known {
     Eigen::Vector3d searched_at = Eigen::Vector3d::Zero();
     double slack_m = 0.0;

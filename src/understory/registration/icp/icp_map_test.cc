@@ -131,8 +131,8 @@ TEST(IcpMap, KnowsTheSurfaceAroundEachPoint) {
   expect_surfaces(*builder.snapshot(), pose.rotation_matrix());
 }
 
-// What changes step by step ends up as if it were made at once: surfaces near a change are
-// worked out again, and the cubes that were forgotten leave no trace.
+// What changes step by step ends up as if it were made at once. Surfaces near a change are worked
+// out again, and removed cubes leave no trace.
 TEST(IcpMap, IsTheSameMadeInStepsOrAtOnce) {
   Random random(5);
   const Points floor = random_points(random, 3000, 3.0);

@@ -7,8 +7,8 @@
 
 namespace understory {
 
-// Exact distances in the plane to the nearest of a few hundred points, for many thousand lookups:
-// each cell of a grid lists the points that can be nearest to any place in it. Immutable.
+// Exact distances in the plane to the nearest of a few hundred points, for many thousand lookups.
+// Each cell of a grid lists the points that can be nearest within it. Immutable.
 class NearestTable {
  public:
   // Covers the points and `margin_m` around them; beyond, lookups are slower but as exact.

@@ -27,8 +27,8 @@ void describe(ConfigTable& table, RingFeaturesConfig& config);
 [[nodiscard]] std::vector<double> ring_smoothness(const Points& ring, int half_window);
 
 // Edges and planes by smoothness (Zhang and Singh, LOAM, 2014, section V.A). Edges are the sharpest
-// points in each sector of a ring, none within theta points of another and none on a surface that
-// something nearer hides. Planes are the smooth ones. With `ground` those of them that lie on
+// points in each sector of a ring. None lies within theta points of another, and none on a surface
+// that something nearer hides. Planes are the smooth ones. With `ground` those of them that lie on
 // ground are kGround (Shan and Englot, LeGO-LOAM, 2018, section III.B). There the slope from a ring
 // to the next one at the same azimuth is small, below the lidar.
 class RingFeatureFinder : public FeatureFinder {

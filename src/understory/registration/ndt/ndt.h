@@ -41,12 +41,12 @@ struct NdtConfig {
 };
 void describe(ConfigTable& table, NdtConfig& config);
 
-// Matches a source cloud to the target, P4 (41): minimises the sum over points of
-// -log(mixture of the cell's normal and a uniform distribution), plus the terms, by Newton steps to
-// where the gradient vanishes. Source points should be thinned by a voxel filter first. Parallel;
-// same bits for any number of threads. Thread-safe. `coarser`: of the same cloud, with larger
-// cells; points whose cell in `target` has too few points for a distribution are matched to these.
-// Null: such points match nothing.
+// Matches a source cloud to the target, P4 (41), by Newton steps to where the gradient vanishes.
+// The cost is the sum over points of -log of a mixture, plus the terms; the mixture is the cell's
+// normal and a uniform distribution. Source points should be thinned by a voxel filter first.
+// Parallel; same bits for any number of threads. Thread-safe. `coarser`: of the same cloud, with
+// larger cells; points whose cell in `target` has too few points for a distribution are matched to
+// these. Null: such points match nothing.
 [[nodiscard]] RegistrationResult register_ndt(const NdtMap& target, const NdtSource& source,
                                               const Pose& guess, const PoseTerms& terms,
                                               const NdtConfig& config,

@@ -13,7 +13,7 @@ namespace understory::internal {
 
 // Sums over a block of points, in axes of the target around the source's origin.
 struct NdtSums : MatchCounts {
-  // Upper triangle of sum of w j j^T, each row followed by its part of the gradient: for row i the
+  // Upper triangle of sum of w j j^T, each row followed by its part of the gradient. Row i has the
   // columns i..5 and the residual.
   std::array<float, 27> hessian{};
   std::array<std::array<float, 6>, 6> exact{};  // what the exact Hessian has beyond that

@@ -29,8 +29,8 @@ bool is_plane(const Shape& shape, double floor) {
   return shape.variance[0] < kPlaneRatio * shape.variance[1] + kPlaneNoise * floor;
 }
 
-// Seen from one side only, and by rays that lie in it: a ring spreads whatever it meets, such as
-// grass, over the cone of its rays.
+// Seen from one side only, and by rays that lie in the surface. A ring spreads whatever it meets,
+// such as grass, over the cone of its rays.
 bool is_edge_on(const CellMoments& moments, const Eigen::Vector3d& normal) {
   const Eigen::Vector3d ray =
       Eigen::Vector3d(moments.ray_x, moments.ray_y, moments.ray_z) / moments.n;

@@ -107,8 +107,8 @@ int surrounding_cells(const float* fraction, Neighbours& to) {
   return n;
 }
 
-// What the exact Hessian has beyond Gauss-Newton, for one point and one cell: the curvature of the
-// mixture, and that of the rotation for a step exp(omega, v) of SE(3).
+// What the exact Hessian has beyond Gauss-Newton, for one point and one cell. It is the curvature
+// of the mixture, and of the rotation for a step exp(omega, v) of SE(3).
 void add_exact_terms(const NdtCell& cell, const Eigen::Vector3f& offset,
                      const Eigen::Vector3f& lever, float d2, float pull_share, NdtSums& sums) {
   using Vector6f = Eigen::Matrix<float, 6, 1>;

@@ -29,10 +29,10 @@ struct NdtMapConfig {
   std::optional<Eigen::Vector3d> viewpoint_in_source = std::nullopt;
   // With a viewpoint: where the further lidars of a scan of several are.
   std::vector<Eigen::Vector3d> further_viewpoints_in_source = {};
-  // With a viewpoint: what a cell shows lies before its middle, towards wherever it is seen from,
-  // by this share of the spread along its second axis, 0..2. This holds for a stem, and for what is
-  // neither surface nor line. A single view of a cylinder would give 1.36, and cells hold many
-  // views. See NdtCell::near_side_m.
+  // With a viewpoint, what a cell shows lies before its middle, towards the place of view. The
+  // distance is this share of the spread along its second axis, 0..2. This holds for a stem, and
+  // for what is neither surface nor line. A single view of a cylinder would give 1.36, and cells
+  // hold many views. See NdtCell::near_side_m.
   double near_side_line = 1.0;
   double near_side_volume = 0.25;
   // With a viewpoint: what looks like a surface and was seen exactly edge-on is taken for what it
@@ -125,7 +125,7 @@ class NdtMapBuilder {
   [[nodiscard]] double bytes() const;
   // The map as it is now. Only what changed since the last snapshot is worked out again; the
   // outcome is the same as if all were. If nobody holds the last snapshot any more, its memory is
-  // written on, and the work does not grow with the map; else it is copied first.
+  // written on, and the work does not grow with the map. Else it is copied first.
   [[nodiscard]] NdtMapPtr snapshot();
 
  private:

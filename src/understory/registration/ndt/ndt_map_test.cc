@@ -117,8 +117,8 @@ TEST(NdtMap, RingsOnTheGroundDoNotConstrainAlongIt) {
   EXPECT_GT(constrained, 50);
 }
 
-// What the cells of even ground, seen by three scans that turn on the spot, say of the heading, for
-// each point: what is more than nothing comes from slopes that are not there.
+// Three scans turn on the spot over even ground. What their cells say of the heading, for each
+// point: anything above zero comes from slopes that are not there.
 double heading_information_of_even_ground(bool few_rings) {
   const testing::Stand flat;
   const Eigen::Quaterniond tilted(Eigen::AngleAxisd(0.35, Eigen::Vector3d::UnitY()));
@@ -150,7 +150,7 @@ double heading_information_of_even_ground(bool few_rings) {
   return information / count;
 }
 
-// Pins a defect: strips of even ground that leaned by some degrees held a turning scan back where
+// Pins a defect: strips of even ground leaned by some degrees. They held a turning scan back where
 // its rings lay on those of the scan before.
 TEST(NdtMap, WithFewRingsEvenGroundDoesNotHoldTheHeading) {
   const double plain = heading_information_of_even_ground(false);
@@ -339,8 +339,8 @@ TEST(NdtMap, WhatWasSeenEdgeOnIsNoGround) {
   EXPECT_GT(steepest_row(config), 10.0);
 }
 
-// Pins a defect: of several lidars the rays of all began at the first one, so that the traces of
-// rings of the others passed for level ground.
+// Pins a defect: the rays of several lidars all began at the first one. Traces of rings of the
+// others then passed for level ground.
 TEST(NdtMap, WhatASecondLidarSawEdgeOnIsNoGround) {
   NdtMapConfig config;
   config.few_rings = true;

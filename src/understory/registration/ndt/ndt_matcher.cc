@@ -237,7 +237,7 @@ std::unique_ptr<const Matcher> make_matcher(const NdtMatcherConfig& config) {
 }
 
 // Sparse scans leave few surfaces, so all cells of the map count. Guesses of scans alone are off by
-// more than the finest cells bridge, and the coarsest are too coarse to lead to them: a map in
+// more than the finest cells bridge, and the coarsest are too coarse to lead to them. A map in
 // between helps.
 std::vector<SuitedSetting> suited_settings(const NdtMatcherConfig& config,
                                            const ScanTraits& traits) {

@@ -32,10 +32,10 @@ struct RangeOffset {
 
 // Estimates the relative pose of two views and one range offset o that both have. With patch means
 // p, q, rays u, v of source and target and the normal n of both, it makes
-//   n . (T (p - o u) - (q - o v))
-// small, under a Geman-McClure kernel (extrinsic and range calibration by planes as in Muhammad and
-// Lacroix, IROS 2010, with the motion as an unknown). What tells o from T is that the same surface
-// is seen from other sides: near ground is too low by more than far ground. Thread-safe.
+//   n . (T (p - o u) - (q - o v)) small, under a Geman-McClure kernel. Muhammad and Lacroix (IROS
+//   2010) calibrate extrinsics and ranges by planes in this way; here the motion is an unknown,
+//   too. What tells o from T is that the same surface is seen from other sides: near ground is too
+//   low by more than far ground. Thread-safe.
 [[nodiscard]] RangeOffset solve_range_offset(const SurfaceView& target, const SurfaceView& source,
                                              const Eigen::Vector3d& lidar_in_body,
                                              const Pose& target_from_source,

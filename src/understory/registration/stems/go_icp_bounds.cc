@@ -15,8 +15,8 @@ double chord(double angle) {
   return 2.0 * std::sin(std::min(0.5 * angle, 0.5 * M_PI));
 }
 
-// About the vertical, a change of a tilt of `angle` turns by up to this share of itself: the third
-// row of the left Jacobian of SO(3), (1 - cos t) / t, largest at 2.33 rad.
+// About the vertical, a change of a tilt of `angle` turns by up to this share of itself. It is the
+// third row of SO(3)'s left Jacobian, (1 - cos t) / t, largest at 2.33 rad.
 double yaw_of_tilt(double angle) {
   constexpr double kLargestAt = 2.331122370;
   const double t = std::min(angle, kLargestAt);
@@ -102,9 +102,9 @@ void GoIcpBounds::in_plane(const GoIcpBox& box) {
   }
 }
 
-// A tilt moves points up and down, and sideways only by their height above the sensor and by how
-// far they have been moved up or down already. So what a box of tilts can do is bounded apart for
-// the plane, where it is little, and for the height. The distance in the plane bounds that in
+// A tilt moves points up and down. It moves them sideways only by their height above the sensor,
+// and by how far they have moved up or down already. So what a box of tilts can do is bounded apart
+// for the plane, where it is little, and for the height. The distance in the plane bounds that in
 // space.
 void GoIcpBounds::in_space(const GoIcpBox& box) {
   const auto& middle = box.middle;

@@ -9,8 +9,8 @@
 
 namespace understory {
 
-// A box of motions about a guess: the source is turned by the guess, tilted by the rotation vector
-// (tilt x, tilt y, 0), turned by the yaw about the vertical and shifted. Radians and metres.
+// A box of motions about a guess. The guess turns the source, the rotation vector (tilt x, tilt y,
+// 0) tilts it, then it is turned by the yaw about the vertical and shifted. Radians and metres.
 struct GoIcpBox {
   enum Side : std::size_t { kYaw, kTiltX, kTiltY, kX, kY, kZ, kSides };
   using Sides = Eigen::Matrix<double, kSides, 1>;

@@ -88,7 +88,7 @@ TEST(GoIcpBounds, NoMotionOfABoxHasASmallerError) {
   }
 }
 
-// One place each, so that nothing averages a bound that promises too much: the target lies where a
+// One place each, so that nothing averages a bound that promises too much. The target lies where a
 // part of the box's motions leads, and only some kinds of motion have any room.
 TEST(GoIcpBounds, HoldForASinglePointWhereverItCanGo) {
   std::mt19937 random(8);
@@ -142,8 +142,8 @@ TEST(GoIcpBox, SidesAreThoseOfTheMotion) {
   }
 }
 
-// The certificate against an exhaustive grid: no place of the grid beats the answer by more than
-// the gap, on stands that match and on two that have nothing to do with each other.
+// The certificate against an exhaustive grid. No place of the grid beats the answer by more than
+// the gap, on stands that match and on two that do not.
 TEST(GoIcp, NoPlaceOfAnExhaustiveGridIsBetter) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     Pair pair = make_pair(seed, 40, 0.1, 0.4, yaw_pose(0.15, 0.9, -0.7, 0.2));
@@ -203,8 +203,8 @@ TEST(GoIcp, NoMotionOfAGridInSpaceIsBetter) {
   }
 }
 
-// A sensor that leans by ten degrees and stands 0.8 m lower, turned by any angle: the plane's
-// search cannot make it level, that of all six degrees of freedom does.
+// A sensor that leans by ten degrees and stands 0.8 m lower, turned by any angle. The search in the
+// plane cannot make it level; that of all six degrees of freedom does.
 TEST(GoIcp, FindsATiltedViewInSpace) {
   const Pose truth = yaw_pose(2.2, -1.5, 2.4, 0.8) *
                      Pose::exp((Vector6d() << 0.12, -0.13, 0.0, 0.0, 0.0, 0.0).finished());

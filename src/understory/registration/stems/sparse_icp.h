@@ -65,9 +65,9 @@ constexpr std::size_t kFewestStems = 6;
 // certificate rests on it.
 [[nodiscard]] std::size_t trimmed_count(std::size_t points, double outlier_ratio);
 
-// Trimmed ICP between points. Where both sides say how well they know their heights, points are
-// paired by their places in the plane, mainly, and heights weigh by what is known of them.
-// Deterministic; thread-safe.
+// Trimmed ICP between points. Where both sides say how well they know their heights, places in the
+// plane decide on pairs in the main. Heights weigh by how well they are known. Deterministic;
+// thread-safe.
 SparseIcpResult register_sparse_icp(const SparseTarget& target, const SparsePoints& source,
                                     const Pose& guess, const SparseIcpConfig& config,
                                     const std::vector<double>& source_height_sd_m = {});

@@ -122,8 +122,8 @@ TEST(SparseIcp, HeightsWeighByWhatIsKnownOfThem) {
   EXPECT_EQ(half.target_from_source.matrix(), blind.target_from_source.matrix());
 }
 
-// Where a tilt is uncertain, the middle of the points is not: it moves neither by it nor in its
-// covariance, while the origin 3 m above it does, by 3 m times the tilt.
+// Where a tilt is uncertain, the middle of the points is not. The tilt changes neither its place
+// nor its covariance, but the origin 3 m above it moves by 3 m times the tilt.
 TEST(TiltAbout, LeavesTheMiddleOfThePointsInPlace) {
   const SparsePoints points = {{2.0, -1.0, -3.5}, {8.0, 5.0, -2.5}};
   const Eigen::Vector3d middle = middle_of(points);

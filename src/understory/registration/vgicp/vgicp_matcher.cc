@@ -36,7 +36,7 @@ static const std::vector<double>& edges_of(const VgicpMatcherConfig& config) {
 static GaussianVoxelsConfig grid_of(const VgicpMatcherConfig&, double edge_m) {
   return {edge_m, 1, true};
 }
-// Thinned by the cubes of ICP's map, whose surfaces span more than the noise of a point: among the
+// Thinned by the cubes of ICP's map, whose surfaces span more than the noise of a point. Among the
 // nearest few points of a dense cloud normals are at random.
 static GaussianSource target_cloud(const VgicpMatcherConfig& config, const Points& points) {
   IcpMapConfig map;

@@ -13,8 +13,8 @@
 namespace understory {
 
 // Voxelised generalised ICP (Koide et al., Voxelized GICP for Fast and Accurate 3D Point Cloud
-// Registration, 2021, (13)). A point meets the mean of the points of its voxel, without a search,
-// in the metric of its own surface and of the mean of theirs.
+// Registration, 2021, (13)). A point meets the mean of the points of its voxel, without a search.
+// The metric is that of its own surface and of the mean of theirs.
 struct VgicpMatcherConfig {
   static constexpr const char* kName = "vgicp";
   static constexpr const char* kSummary = "GICP to voxels instead of points";

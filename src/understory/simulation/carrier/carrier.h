@@ -23,9 +23,8 @@ struct CarrierState {
   Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  // body, rad/s^2
 };
 
-// The true path of the body frame: one quintic B-spline of position and of roll, pitch, yaw, from
-// which every sensor takes its exact pose, rate and acceleration at any time. Immutable,
-// thread-safe.
+// The true path of the body frame: one quintic B-spline of position and of roll, pitch, yaw. Every
+// sensor takes its exact pose, rate and acceleration at any time from it. Immutable, thread-safe.
 class CarrierPath {
  public:
   using Spline = QuinticSpline<6>;  // x, y, z, roll, pitch, yaw

@@ -72,8 +72,8 @@ inline double turn_time(double angle_rad, double peak_rate_deg_s) {
   return std::max(0.5, 1.875 * std::abs(angle_rad) / (peak_rate_deg_s * kDegree));
 }
 
-// Heading against that of the route at the start, radians: `first_turn_deg` to go, at an even rate
-// but for half a second at both ends, until half a second before the carrier leaves.
+// Heading against that of the route at the start, radians. `first_turn_deg` are turned until half a
+// second before the carrier leaves, at an even rate but for half a second at both ends.
 inline double first_turn(const CarrierConfig& c, double t) {
   constexpr double kRampS = 0.5;
   const double angle = c.first_turn_deg * kDegree;

@@ -129,8 +129,8 @@ CarrierPlan plan_sleigh(const SiteConfig& config, const Route& route, const Terr
 
 namespace {
 
-// Where a UAV wants to be: still on the ground, up, along the route with slow changes of pace and
-// height, and a hover at the end.
+// Where a UAV wants to be. It stands on the ground, rises, follows the route with slow changes of
+// pace and height, and hovers at the end.
 struct Flight {
   std::vector<Eigen::Vector3d> places;
   std::vector<double> headings;

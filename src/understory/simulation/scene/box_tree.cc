@@ -166,8 +166,8 @@ class Joined {
   }
 
  private:
-  // By the number of slots that a part may take, less one: its cost, and how many of the slots its
-  // first half gets (0: it takes one, as a node).
+  // By the number of slots that a part may take, less one: its cost, and how many of them its first
+  // half gets. 0: it takes one, as a node.
   struct Ways {
     std::array<float, kLanes> cost;
     std::array<std::uint8_t, kLanes> first;

@@ -94,9 +94,9 @@ struct Entered {
 };
 
 // Goes through a tree along a beam, the nearer boxes first. It calls leaf(place in order(), range
-// from which on it is met) for those that it meets between `near` and `far`, and leaf may lower
-// `far`. fetch(place) comes some time before and may bring near what leaf will need. What of the
-// root is met may be known before.
+// from which on it is met) for those that it meets between `near` and `far`. leaf may lower `far`.
+// fetch(place) comes some time before and may bring near what leaf will need. What of the root is
+// met may be known before.
 template <class Fetch, class Leaf>
 void walk(const BoxTree& tree, const FatRay& beam, float near, const float& far, Fetch&& fetch,
           Leaf&& leaf, const Entered* entered = nullptr) {

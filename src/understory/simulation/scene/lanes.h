@@ -12,8 +12,8 @@
 #endif
 
 // Eight floats that are worked on together: one register where the program is compiled for AVX2
-// (cmake/Gtsam.cmake: it is by default), else plain loops, which the compiler cuts in pieces.
-// Comparisons give masks, one bit a lane; what is not a number compares false.
+// (cmake/Gtsam.cmake, the default). Elsewhere they are plain loops, which the compiler cuts in
+// pieces. Comparisons give masks, one bit a lane; what is not a number compares false.
 namespace understory {
 
 constexpr std::size_t kLanes = 8;

@@ -61,7 +61,7 @@ void ObjectField::commit() {
   tree_.empty() ? void(tree_ = BoxTree(boxes_)) : tree_.refit(boxes_);
 }
 
-void ObjectField::cast(const RayLanes& rays, LaneMask active, float near, Struck& struck) const {
+void ObjectField::cast(const RayLanes& rays, LaneMask active, float near, RayHits& struck) const {
   if (tree_.empty()) return;
   const FatRay beam(rays, active, tree_.frame());
   BoxTree::Frame metres;

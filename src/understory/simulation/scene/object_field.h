@@ -24,7 +24,7 @@ class ObjectField {
   void commit();
 
   // As RayShape::cast; struck.object is the number of what was met.
-  void cast(const RayLanes& rays, LaneMask active, float near, Struck& struck) const;
+  void cast(const RayLanes& rays, LaneMask active, float near, RayHits& struck) const;
 
   [[nodiscard]] Eigen::Vector3f normal(std::uint32_t object, std::uint32_t primitive,
                                        const Eigen::Vector3f& place_in_world) const;
@@ -36,8 +36,8 @@ class ObjectField {
     bool present;
   };
 
-  // The boxes of the first parts of an object's tree in the world, as those of a node: what meets
-  // none of them need not be turned into the shape's frame.
+  // The boxes of the first parts of an object's tree in the world, as those of a node. A ray that
+  // meets none of them need not be turned into the shape's frame.
   struct Parts {
     std::array<std::array<float, kLanes>, 6> planes;
   };

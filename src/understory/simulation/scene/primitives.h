@@ -13,9 +13,9 @@
 // thing lies within [near, range], notes its number there and says whether it did.
 namespace understory {
 
-// What rays met so far, ray by ray: the range (at first the limit), and as bits the numbers of the
-// primitive and of the object.
-struct Struck {
+// What rays met so far, ray by ray: the range, which is at first the limit. As bits, also the
+// numbers of the primitive and of the object.
+struct RayHits {
   Lanes range;
   Lanes primitive;
   Lanes object;
@@ -45,7 +45,7 @@ struct Triangle {
     return rows.row(0).head<3>();
   }
 
-  bool meet(const RayLanes& rays, float near, std::uint32_t number, Struck& struck) const {
+  bool meet(const RayLanes& rays, float near, std::uint32_t number, RayHits& struck) const {
     constexpr float kSeam = 1e-5F;  // of an edge: what lies side by side leaves no gap
     const Lanes3& d = rays.direction;
     const Lanes3& o = rays.origin;
@@ -87,7 +87,7 @@ struct Disc {
     return {centre - reach, centre + reach};
   }
 
-  bool meet(const RayLanes& rays, float near, std::uint32_t number, Struck& struck) const {
+  bool meet(const RayLanes& rays, float near, std::uint32_t number, RayHits& struck) const {
     const Lanes3& d = rays.direction;
     const Lanes3 to = {Lanes(centre.x()) - rays.origin.x, Lanes(centre.y()) - rays.origin.y,
                        Lanes(centre.z()) - rays.origin.z};
@@ -130,7 +130,7 @@ struct RoundCone {
   }
 
   // Where rays enter the body, or, where that lies before `near`, leave it.
-  bool meet(const RayLanes& rays, float near, std::uint32_t number, Struck& struck) const {
+  bool meet(const RayLanes& rays, float near, std::uint32_t number, RayHits& struck) const {
     Lanes at = pass<true>(rays);
     const LaneMask before = at < Lanes(near);
     if (before.bits() != 0) at = select(before, pass<false>(rays), at);
@@ -147,10 +147,10 @@ struct RoundCone {
   float cosine2 = 1.0F;
 
  private:
-  // A line enters a convex body once: where it first enters one of the balls or, between their
-  // circles, the cone; and leaves it where it last leaves one of these. With a = height along the
-  // axis above the foot, r = foot_radius, s = sine and c = cosine of half the cone's angle, the
-  // cone is where c^2 (|w|^2 - a^2) = (r - a s)^2 for places w from the foot.
+  // A line enters a convex body once, where it first enters one of the balls or, between their
+  // circles, the cone. It leaves where it last leaves one of these. With a = height along the axis
+  // above the foot, r = foot_radius, s = sine and c = cosine of half the cone's angle. Places w
+  // from the foot lie on the cone where c^2 (|w|^2 - a^2) = (r - a s)^2.
   template <bool kEnter>
   [[nodiscard]] Lanes pass(const RayLanes& rays) const {
     const Lanes3& d = rays.direction;

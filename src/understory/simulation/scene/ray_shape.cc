@@ -51,7 +51,7 @@ RayShape::RayShape(const std::vector<TreeCloud::Disc>& discs) {
   plant_tree(boxes, make);
 }
 
-void RayShape::cast(const RayLanes& rays, LaneMask active, float near, Struck& struck,
+void RayShape::cast(const RayLanes& rays, LaneMask active, float near, RayHits& struck,
                     const Entered* entered) const {
   const FatRay beam(rays, active, tree_.frame());
   std::visit(

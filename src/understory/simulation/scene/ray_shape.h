@@ -19,10 +19,10 @@ class RayShape {
   explicit RayShape(const Cones& cones);
   explicit RayShape(const std::vector<TreeCloud::Disc>& discs);
 
-  // Lowers struck.range where the rays of `active` meet something between `near` and it;
-  // struck.primitive is then its number in the shape that this was made of.
-  // What is known of the root of tree() may be given.
-  void cast(const RayLanes& rays, LaneMask active, float near, Struck& struck,
+  // Lowers struck.range where the rays of `active` meet something between `near` and it.
+  // struck.primitive is then its number in the shape that this was made of. What is known of the
+  // root of tree() may be given.
+  void cast(const RayLanes& rays, LaneMask active, float near, RayHits& struck,
             const Entered* entered = nullptr) const;
 
   // Of any length; `place` is on the primitive.

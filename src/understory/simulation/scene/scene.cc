@@ -259,8 +259,8 @@ class ForestScene::Impl : private SceneContent {
     return hit;
   }
 
-  // A stem's bark lies beside the round stem that was hit, and so does the hit, along the ray and
-  // to first order: the outline stays round. Normal and ray in a frame whose z axis is the tree's.
+  // A stem's bark lies beside the round stem that was hit. The hit moves to it along the ray, to
+  // first order, and the outline stays round. Normal and ray in a frame whose z axis is the tree's.
   void emboss(std::size_t tree, float foot_z, const Eigen::Vector3f& normal,
               const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, Hit& hit) const {
     const StemSurface& surface = surfaces_[tree];

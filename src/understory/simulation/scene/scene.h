@@ -70,9 +70,9 @@ class ForestScene {
 
   // The first thing each ray meets within [near_m, far_m]. Neighbouring rays should lie beside each
   // other: sixteen at a time go through the scene together. In a scene for bundles, those of a beam
-  // do, of which each has `rays_per_beam`. Between the moment of the scene and its own a ray sees
-  // what it hits moved on by the wind, to first order: surfaces move along the beam and across it,
-  // their outlines stay.
+  // do, of which each has `rays_per_beam`. A ray sees what it hits as the wind has moved it between
+  // the moment of the scene and its own. This is to first order: surfaces move along the beam and
+  // across it, their outlines stay.
   void cast(const Ray* rays, std::size_t count, float near_m, float far_m, Hit* hits,
             std::size_t rays_per_beam = 1) const;
 

@@ -76,7 +76,7 @@ void SceneBundles::cast(const Ray* rays, std::size_t count, float near_m, float 
                         Met* met) const {
   const RayLanes lanes = lanes_of(rays, count);
   const LaneMask all = Lanes(0.0F) <= Lanes(0.0F);
-  Struck struck{far_m, bits(kNone), bits(kNone)};
+  RayHits struck{far_m, bits(kNone), bits(kNone)};
   // First what stands in the way most surely: leaves behind it need not be looked for.
   const auto meet_fixed = [&](const RayShape& shape, std::uint32_t object) {
     const Lanes before = struck.range;

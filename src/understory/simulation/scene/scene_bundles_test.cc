@@ -96,8 +96,8 @@ TEST(FatRay, MeetsEveryBoxThatOneOfItsRaysMeets) {
   EXPECT_LT(met, 300U * 400U);  // it does leave out most of them
 }
 
-// A place's distance outside of the convex hull of two balls, in twice the digits: least over the
-// balls between, along which it has one minimum.
+// A place's distance outside of the convex hull of two balls, in twice the digits. It is the least
+// over the balls between, along which it has one minimum.
 double outside(const RoundCone& cone, const Eigen::Vector3d& place) {
   const auto off = [&](double u) {
     const Eigen::Vector3d centre =
@@ -126,7 +126,7 @@ TEST(RoundCone, IsMetOnItsSurfaceAndNotPassedThrough) {
     std::vector<Ray> rays = beam(random, from, (to - from).normalized(), 0.02F);
     for (Ray& ray : rays)
       ray.direction *= 0.5F;  // need not be of unit length
-    Struck struck{100.0F, 0.0F, 0.0F};
+    RayHits struck{100.0F, 0.0F, 0.0F};
     cone.meet(lanes(rays), 0.0F, 7, struck);
     std::array<float, kLanes> ranges;
     struck.range.store(ranges.data());
@@ -157,7 +157,7 @@ TEST(Disc, IsMetWithinItsRadius) {
     const RayShape shape(one);
     const Eigen::Vector3f from = 5.0F * any_direction(random);
     const std::vector<Ray> rays = beam(random, from, (one[0].centre - from).normalized(), 0.05F);
-    Struck struck{100.0F, 0.0F, 0.0F};
+    RayHits struck{100.0F, 0.0F, 0.0F};
     shape.cast(lanes(rays), all_lanes(), 0.0F, struck);
     std::array<float, kLanes> ranges;
     struck.range.store(ranges.data());
@@ -195,7 +195,7 @@ TEST(ObjectField, MeetsObjectsWhereTheyAreNow) {
   const std::vector<Ray> east = beam(random, origin, Eigen::Vector3f::UnitX(), 0.001F);
   const std::vector<Ray> north = beam(random, origin, Eigen::Vector3f::UnitY(), 0.001F);
   const auto range = [&](const std::vector<Ray>& rays) {
-    Struck struck{100.0F, 0.0F, 0.0F};
+    RayHits struck{100.0F, 0.0F, 0.0F};
     field.cast(lanes(rays), all_lanes(), 0.0F, struck);
     std::array<float, kLanes> ranges;
     struck.range.store(ranges.data());

@@ -21,8 +21,8 @@ namespace understory {
 // One thread builds, so that the tree of boxes does not depend on how many there are.
 void commit_alone(RTCScene scene);
 
-// What a ForestScene holds: a fixed scene of ground, stems and dead wood, and a scene of instances:
-// crowns, plants, and of the stems what sways or falls. Built once; owns all of it.
+// What a ForestScene holds: a fixed scene of ground, stems and dead wood, and a scene of instances.
+// Those are crowns, plants, and stems that sway or fall. Built once; owns all of it.
 class SceneContent {
  public:
   SceneContent(const StandConfig& config, const Terrain& terrain, const Stand& stand,

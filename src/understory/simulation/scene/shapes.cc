@@ -92,7 +92,7 @@ double crown_profile(Species species, double u) {
   return 1.0;
 }
 
-// Share of their needles that the branches of a pine keep: those in the shade of the crown above
+// Share of their needles that the branches of a pine keep. Those in the shade of the crown above
 // are long and thin, and many of them bare.
 double lit_share(Species species, double u, Random& random) {
   if (species != Species::kPine) return 1.0;

@@ -14,8 +14,8 @@ constexpr float kPlateWidth = 0.035F;  // metres around the stem
 constexpr float kPlateHeight = 0.11F;
 constexpr float kHalfSwelling = 0.06F;  // metres along the stem
 
-// How deep the bark's relief is at the foot and above, and how much the branches' bases swell:
-// shares of what the site says, which is meant for a pine of 25 cm.
+// How deep the bark's relief is at the foot and above, and how much the branches' bases swell. Both
+// are shares of the site's figures, which are for a pine of 25 cm.
 struct Bark {
   float low;
   float high;

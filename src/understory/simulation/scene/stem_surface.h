@@ -8,16 +8,16 @@
 namespace understory {
 
 // What of a stem is not round: an oval and lobed section that turns slowly with height, swellings
-// where branches leave, and the relief of its bark. A function of place on the bark alone, of mean
-// zero around and along the stem, so that the mean diameter (girth / pi) is the tree's. A value
-// type; calls are thread-safe.
+// at branches, and bark. It depends on the place on the bark alone and has the mean zero around and
+// along the stem. So the mean diameter (girth / pi) is the tree's. A value type; calls are
+// thread-safe.
 class StemSurface {
  public:
   StemSurface() = default;  // round and smooth
   StemSurface(const StandConfig& config, const GrownTree& tree, std::uint64_t seed);
 
-  // Metres by which the bark lies outside of the round stem, at a height above the foot and on the
-  // side that (x, y) points to: a vector of length 1 in the world's plane.
+  // Metres by which the bark lies outside of the round stem, at a height above the foot. (x, y) is
+  // the side: a vector of length 1 in the world's plane.
   [[nodiscard]] float offset(float x, float y, float height_m) const;
 
   // Share of the radius by which the section is lobed `order` (2, 3 or 4) times around at a height.

@@ -12,7 +12,7 @@ Hit hit(float range_m, float reflectivity, Surface surface, int tree = 0) {
 }
 
 // Hits within a pulse's length are one echo at their mean by energy, and rays that met nothing take
-// their share of the beam with them: by whichever way the number of rays leads.
+// their share of the beam. This holds for every way to choose the number of rays.
 TEST(BeamEcho, HitsWithinAPulseMerge) {
   for (const std::size_t rays : {3U, 8U}) {
     std::vector<Hit> hits(rays);

@@ -12,8 +12,8 @@
 
 namespace understory {
 
-// A stream of random numbers that depends on nothing but its key: the noise of a beam is the same
-// whichever thread casts it and in whatever order. Cheap to make, a value type.
+// A stream of random numbers that depends on nothing but its key. The noise of a beam is the same
+// in any thread and order. Cheap to make, a value type.
 class CounterNoise {
  public:
   CounterNoise() = default;

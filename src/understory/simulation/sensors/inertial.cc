@@ -12,7 +12,7 @@ namespace understory {
 namespace {
 
 // Time constants of the parts of the bias instability, and the standard deviation of each for an
-// instability of 1: together they give an Allan deviation of 0.664 (within 3 % from 3 to 300 s).
+// instability of 1. Together they give an Allan deviation of 0.664 (within 3 % from 3 to 300 s).
 constexpr double kFlickerSeconds[] = {2.0, 20.0, 200.0, 2000.0};
 constexpr double kFlickerShare = 0.882;
 
@@ -115,7 +115,7 @@ bool InertialSensor::lost() {
 }
 
 // Harmonics of the carrier's main tone, ever weaker.
-Eigen::Vector3d InertialSensor::overtones(double time_s) const {
+Eigen::Vector3d InertialSensor::vibration_harmonics(double time_s) const {
   const double strength = config_.vibration_m_s2 * (1.0 + 0.5 * std::sin(kTau * 0.21 * time_s));
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (int i = 2; i <= config_.vibration_tones; ++i) {
@@ -128,8 +128,8 @@ Eigen::Vector3d InertialSensor::overtones(double time_s) const {
   return sum;
 }
 
-// What is left of the blows of the last half second: ringing of the frame at some tens of hertz, in
-// a direction of its own each time.
+// What is left of the blows of the last half second. The frame rings at some tens of hertz, in a
+// direction of its own each time.
 void InertialSensor::shake(double time_s, ImuSample& sample) const {
   const auto after = std::upper_bound(shocks_s_.begin(), shocks_s_.end(), time_s);
   for (auto shock = after; shock != shocks_s_.begin();) {
@@ -184,7 +184,7 @@ ImuSample InertialSensor::next() {
                         config_.gyro_noise * root * normal3(noise);
   sample.specific_force = accel_scale_ * (imu_from_body * force_in_body) + accel_bias_ + vibration +
                           config_.accel_noise * root * normal3(noise);
-  if (config_.vibration_tones > 1) sample.specific_force += overtones(time);
+  if (config_.vibration_tones > 1) sample.specific_force += vibration_harmonics(time);
   if (config_.shock_m_s2 > 0.0 || config_.shock_rad_s > 0.0) shake(time, sample);
   saturate(sample);
   sample.stamp += from_seconds(config_.time_offset_s);

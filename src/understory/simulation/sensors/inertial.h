@@ -15,7 +15,7 @@ namespace understory {
 // The IMU: samples of the true motion at its own place with scale errors, biases, vibration, shocks
 // and white noise. A bias is the sum of its value at the start, a random walk, a bias instability
 // and a drift with the sensor's temperature. The instability is flicker noise: four first-order
-// processes whose time constants are a factor of ten apart, which keep the Allan deviation level
+// processes whose time constants are a factor of ten apart. They keep the Allan deviation level
 // from 3 s to 300 s. Samples come one after another; the biases are those of the last one. The
 // turning of the earth is left out.
 class InertialSensor {
@@ -41,7 +41,7 @@ class InertialSensor {
 
   void walk_biases();
   void drift();
-  [[nodiscard]] Eigen::Vector3d overtones(double time_s) const;
+  [[nodiscard]] Eigen::Vector3d vibration_harmonics(double time_s) const;
   void shake(double time_s, ImuSample& sample) const;
   void saturate(ImuSample& sample) const;
 

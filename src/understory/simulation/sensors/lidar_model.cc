@@ -47,9 +47,9 @@ LidarModel rs_16(const LidarConfig& config) {
   return model;
 }
 
-// Two blocks of 32 lasers, the upper one a third of a degree apart from 2 degrees down, the lower
-// one half a degree apart, each block in four columns. A pair, one of each block, fires every
-// 1.5 us; 48 us a sequence.
+// Two blocks of 32 lasers, each in four columns. The upper one is a third of a degree apart from 2
+// degrees down, the lower one half a degree. A pair, one of each block, fires every 1.5 us; 48 us a
+// sequence.
 LidarModel hdl_64(const LidarConfig& config) {
   constexpr double kColumns[4] = {-3.9, 2.6, -1.3, 5.2};
   LidarModel model;
@@ -78,9 +78,9 @@ LidarModel vlp_16(const LidarConfig& config) {
   return model;
 }
 
-// 32 lasers a degree apart, from the highest down. The first fires 6 us after the block's time, and
-// 1.512 us lie from laser to laser, 50 us a sequence (PandarXT User Manual, "Channel Distribution"
-// and "Absolute Time of Point Cloud Data").
+// 32 lasers a degree apart, from the highest down. The first fires 6 us after the block's time,
+// then one every 1.512 us, 50 us a sequence. Source: PandarXT User Manual, "Channel Distribution"
+// and "Absolute Time of Point Cloud Data".
 LidarModel xt_32(const LidarConfig& config) {
   LidarModel model;
   for (int i = 0; i < 32; ++i)
@@ -93,8 +93,8 @@ LidarModel xt_32(const LidarConfig& config) {
 
 // Four lines from -7 to 52 degrees and 200 000 points a second (Mid-360 User Manual v1.2,
 // "Specifications"). Livox publishes no equation of the pattern. This one stands in for it. It has
-// one turn a frame, and a golden share of a swing left over from turn to turn, so that swings of
-// later turns fall between those of earlier ones.
+// one turn a frame, and a golden share of a swing left over from turn to turn. Swings of later
+// turns then fall between those of earlier ones.
 LidarModel mid_360(const LidarConfig& config) {
   constexpr int kLines = 4;
   constexpr double kSwingsPerTurn = 17.0 + 0.6180339887498949;

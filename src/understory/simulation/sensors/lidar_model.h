@@ -36,8 +36,8 @@ struct LidarModel {
   [[nodiscard]] bool swings() const { return swing_hz > 0.0; }
   // Of a beam at a time since the start of the first revolution.
   [[nodiscard]] double elevation(std::size_t beam, double time_ns) const;
-  // Azimuth of the head at a time since the start of the first revolution: radians from the
-  // sensor's x axis against the clock, in [-pi, pi].
+  // Azimuth of the head at a time since the start of the first revolution. Radians from the
+  // sensor's x axis, anticlockwise, in [-pi, pi].
   [[nodiscard]] double azimuth(double time_ns) const;
   // Firings of revolution `scan` that look into the field of view: [first, end).
   struct Firings {

@@ -17,10 +17,10 @@ namespace understory {
                                                 const Eigen::Vector3d& point_in_enu);
 
 // The GNSS receiver under trees. It has slow and fast errors correlated in time, both growing with
-// the share of the sky that the stand hides, and its height is worse than its plane. It has
-// outages, bursts, jumps, and a covariance that promises too much. Where asked, it holds its
-// position while it stands, and tells the heading or the position of a second antenna. Fixes come
-// one after another.
+// the share of the sky that the stand hides. Its height is worse than its plane. It has outages,
+// bursts, jumps, and a covariance that promises too much. Where asked, it holds its position while
+// it stands, and tells the heading or the position of a second antenna. Fixes come one after
+// another.
 class SatelliteReceiver {
  public:
   // `path` and `scene` must outlive the receiver.

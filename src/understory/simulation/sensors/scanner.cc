@@ -173,7 +173,8 @@ const BeamDirections& Scanner::directions(std::int64_t firing, BeamDirections& s
 }
 
 // What the lidar says of them.
-const BeamDirections& Scanner::told_directions(std::int64_t firing, BeamDirections& swung) const {
+const BeamDirections& Scanner::reported_directions(std::int64_t firing,
+                                                   BeamDirections& swung) const {
   if (!model_.swings()) return told_;
   swung = BeamDirections(model_, static_cast<double>(model_.firing_time(firing)));
   return swung;
@@ -245,7 +246,7 @@ ScanPtr Scanner::assemble(std::int64_t number, const ScanReadings& readings) con
   BeamDirections swung;
   for (std::int64_t firing = firings.first; firing < firings.end; ++firing) {
     const TimeNs firing_time = model_.firing_time(firing);
-    const BeamDirections& looks = told_directions(firing, swung);
+    const BeamDirections& looks = reported_directions(firing, swung);
     Turn head(0.0);
     Eigen::Vector3f origin = Eigen::Vector3f::Zero();
     for (std::size_t b = 0; b < beams; ++b, ++i) {
@@ -285,7 +286,7 @@ void Scanner::cast_block(double moment_s, Block& block) const {
   scene_.cast(block.rays.data(), block.rays.size(), static_cast<float>(config_.min_range_m),
               static_cast<float>(config_.max_range_m), block.hits.data(),
               static_cast<std::size_t>(config_.rays_per_beam));
-  if (!machine_.empty()) meet_machine(block);
+  if (!machine_.empty()) hit_machine(block);
   const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
   NoiseRow row(seed_, 0);
   for (std::size_t i = 0; i < block.readings.size(); ++i) {
@@ -298,7 +299,7 @@ void Scanner::cast_block(double moment_s, Block& block) const {
     if (weather_.has_snow()) {
       const auto number = static_cast<std::int64_t>(firing);
       const BeamEcho behind = echo;
-      weather_.meet_snow(number, i % beams, to_seconds(model_.firing_time(number)), echo);
+      weather_.add_flake_echo(number, i % beams, to_seconds(model_.firing_time(number)), echo);
       if (two && echo.surface == Surface::kSnow) second = behind;
     }
     if (keeps_sources_) {
@@ -320,7 +321,7 @@ void Scanner::cast_block(double moment_s, Block& block) const {
   block.let_go_of_rays();
 }
 
-// Readings that nothing stands for: glaring echoes repeat in the beam's neighbours of the firings
+// Readings that nothing stands for. Glaring echoes repeat in the beam's neighbours of the firings
 // before and after (within a group), and other sensors' pulses give any range.
 void Scanner::add_ghosts(Block& block) const {
   const std::size_t beams = model_.beams.size();
@@ -458,7 +459,7 @@ void Scanner::look_out(const Look& look, std::int64_t firing,
   }
 }
 
-void Scanner::meet_machine(Block& block) const {
+void Scanner::hit_machine(Block& block) const {
   const std::size_t beams = model_.beams.size();
   const auto rays_per_beam = static_cast<std::size_t>(config_.rays_per_beam);
   for (std::size_t f = 0; f * beams < block.slots.size(); ++f) {

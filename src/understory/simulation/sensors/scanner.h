@@ -91,11 +91,11 @@ class Scanner {
   void look_out(const Look& look, std::int64_t firing, std::pair<std::size_t, std::size_t> range,
                 const std::uint32_t* slots, std::vector<Ray>& rays) const;
   [[nodiscard]] const BeamDirections& directions(std::int64_t firing, BeamDirections& swung) const;
-  [[nodiscard]] const BeamDirections& told_directions(std::int64_t firing,
-                                                      BeamDirections& swung) const;
+  [[nodiscard]] const BeamDirections& reported_directions(std::int64_t firing,
+                                                          BeamDirections& swung) const;
   [[nodiscard]] std::vector<std::uint32_t> trace_order() const;
   void find_slots(std::size_t firings, Block& block) const;
-  void meet_machine(Block& block) const;
+  void hit_machine(Block& block) const;
   void add_ghosts(Block& block) const;
   void add_spurious(Block& block) const;
 

@@ -137,8 +137,8 @@ TEST(Scanner, NarrowViewKeepsToItsSector) {
   EXPECT_GT(widest, 104.0);
 }
 
-// Beams that swing: the places of the ground that they meet are those of the directions that the
-// points claim, at the times that they claim.
+// Beams that swing. They meet the ground at places that agree with the directions and the times of
+// the points.
 TEST(Scanner, Mid360SwingsOverItsFieldAndMeetsTheGroundThere) {
   SiteConfig site = quiet_site();
   site.terrain.relief_m = site.terrain.slope_deg = 0.0;

@@ -14,8 +14,8 @@ struct PrismSample {
   Eigen::Vector3d place = Eigen::Vector3d::Zero();
 };
 
-// Where the prism truly is: on a link of its own that turns with the body but takes over only a
-// part of its tilt (a levelled cabin on soft mounts). Thread-safe.
+// Where the prism truly is. Its link turns with the body but takes over only a part of its tilt (a
+// levelled cabin on soft mounts). Thread-safe.
 [[nodiscard]] Eigen::Vector3d prism_in_world(const TotalStationConfig& config,
                                              const CarrierPath& path, double time_s);
 

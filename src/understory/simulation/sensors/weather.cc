@@ -49,8 +49,8 @@ double LidarWeather::flakes_per_m(double time_s) const {
 }
 
 // Whether a flake is strong enough is settled as for any other echo.
-void LidarWeather::meet_snow(std::int64_t firing, std::uint64_t beam, double time_s,
-                             BeamEcho& echo) const {
+void LidarWeather::add_flake_echo(std::int64_t firing, std::uint64_t beam, double time_s,
+                                  BeamEcho& echo) const {
   const double per_m = flakes_per_m(time_s);
   if (per_m <= 0.0) return;
   CounterNoise noise(seed_ + 6, static_cast<std::uint64_t>(firing), beam);

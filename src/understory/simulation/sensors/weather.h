@@ -30,7 +30,7 @@ class LidarWeather {
 
   [[nodiscard]] bool has_snow() const { return snow_fall_per_m_ > 0.0 || snow_interval_s_ > 0.0; }
   // A flake in front of what the beam would have met gives the first echo, if it is strong enough.
-  void meet_snow(std::int64_t firing, std::uint64_t beam, double time_s, BeamEcho& echo) const;
+  void add_flake_echo(std::int64_t firing, std::uint64_t beam, double time_s, BeamEcho& echo) const;
 
   [[nodiscard]] bool has_spurious() const { return cold_noise_ > 0.0 || sun_noise_ > 0.0; }
   // The reading that a beam gives instead of its own, out of nothing; none where all is well.

@@ -69,7 +69,7 @@ TEST(LidarWeather, WithoutItNothingIsMet) {
   EXPECT_FALSE(weather.has_snow());
   EXPECT_FALSE(weather.has_spurious());
   BeamEcho echo;
-  weather.meet_snow(3, 2, 1.0, echo);
+  weather.add_flake_echo(3, 2, 1.0, echo);
   EXPECT_EQ(echo.surface, Surface::kNone);
 }
 

@@ -13,8 +13,8 @@ namespace understory {
 
 struct CarrierPlan;
 
-// A tree that is cut: gripped where it stands, felled to one side of the boom, fed through the head
-// (which strips its branches) and cut into logs.
+// A tree that is cut. It is gripped where it stands, felled to one side of the boom, fed through
+// the head (which strips its branches) and cut into logs.
 struct Felling {
   int tree = 0;
   double grab_s = 0.0;         // cut off its stump: from here on it hangs in the head

@@ -34,8 +34,8 @@ double outside_of(const StandObject& object, const Eigen::Vector3d& point, doubl
   const Eigen::Vector3d off = point - motion_at(object, time_s).foot;
   const double c = std::cos(object.yaw_rad);
   const double s = std::sin(object.yaw_rad);
-  // Legs of walkers step out of the size that is told, and between the moment of the scene and a
-  // beam's own time their outlines stay: up to 8 cm. Posts lean.
+  // Legs of walkers step out of the stated size. Between the moment of the scene and a beam's own
+  // time their outlines stay: up to 8 cm. Posts lean.
   const double more = object.walk_m > 0.0 ? 0.2 : 0.1;
   const double along = std::abs(c * off.x() + s * off.y()) - 0.5 * object.size_m.x() - more;
   const double across = std::abs(c * off.y() - s * off.x()) - 0.5 * object.size_m.y() - more - 0.05;

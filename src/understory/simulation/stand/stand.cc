@@ -107,8 +107,8 @@ double filled_share(const StandConfig& config, const Route& route) {
   return static_cast<double>(inside) / static_cast<double>(std::max<std::size_t>(all, 1));
 }
 
-// Whether the carrier can pass: the bark stays clear of the path at the height of the sensors, and
-// a crown that hangs low does not swallow them.
+// Whether the carrier can pass. The bark must stay clear of the path at the height of the sensors,
+// and no low crown may swallow them.
 bool clear_of_route(const GrownTree& tree, const Eigen::Vector2d& foot, const StandConfig& config,
                     const CarrierConfig& carrier, const Route& route) {
   const double sensor = std::max(1.5, carrier.height_m);

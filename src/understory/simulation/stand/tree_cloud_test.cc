@@ -23,7 +23,7 @@ namespace understory {
 namespace {
 
 // An oval stem (30 x 24 cm at the foot, tapering to 8 m) away from zero and leaning, with a ball of
-// foliage at 5 to 8 m: a shape that no grown stem has.
+// foliage at 5 to 8 m. No grown stem has such a shape.
 std::string write_oval_tree(const std::string& name) {
   Random random(3);
   std::ofstream file(name);

@@ -57,7 +57,7 @@ class ConfigTable {
   [[nodiscard]] const std::vector<Field>& fields() const { return fields_; }
 
   // Reads YAML text or a file into the bound variables. Unknown keys (with the nearest known one as
-  // a hint), wrong types and values out of range are all gathered into one ConfigError; `origin`
+  // a hint), wrong types and values out of range are all gathered into one ConfigError. `origin`
   // (file name) is put before each. With `passed_over` unknown keys are no problem and are told
   // there.
   void read_yaml(const std::string& text, const std::string& origin,

@@ -7,10 +7,10 @@
 
 namespace understory {
 
-// A file that appears whole or not at all: written beside its place as `path.part`, synced to the
-// disk, renamed, and its folder synced by `commit`; dropped by the destructor otherwise. Every
-// failure is an OutputError with the file and the system's reason (disk full, not writable). Not
-// thread-safe.
+// A file that appears whole or not at all. It is written beside its place as `path.part`; `commit`
+// syncs it to the disk, renames it, and syncs its folder. Without that the destructor drops it.
+// Every failure is an OutputError with the file and the system's reason (disk full, not writable).
+// Not thread-safe.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path path);
@@ -49,8 +49,8 @@ class AtomicTextFile {
   std::unique_ptr<Gzip> gzip_;
 };
 
-// Names of files that other programs write by themselves (GDAL): a temporary path beside `path` and
-// the sync and rename to it, on the disk in the end. Throws OutputError.
+// For files that other programs write by themselves (GDAL). part_path gives a temporary path beside
+// `path`. sync_and_rename syncs the file, renames it, and syncs its folder. Throws OutputError.
 [[nodiscard]] std::filesystem::path part_path(const std::filesystem::path& path);
 void sync_and_rename(const std::filesystem::path& from, const std::filesystem::path& to);
 

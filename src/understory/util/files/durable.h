@@ -4,7 +4,7 @@
 
 namespace understory {
 
-// Waits until what was made, renamed or removed in a folder is on the disk: after a power cut a
+// Waits until what was made, renamed or removed in a folder is on the disk. After a power cut a
 // file is found again only if both it and its folder were synced. Folders that cannot be synced
 // (some network file systems) are passed over. Throws OutputError.
 void sync_folder(const std::filesystem::path& folder);

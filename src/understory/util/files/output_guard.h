@@ -15,12 +15,12 @@ class RefusedOutput : public OutputError {
   using OutputError::OutputError;
 };
 
-// Refuses an output that would touch what is read: one that is an input, lies in an input that is
-// a folder, or is a folder that holds an input. Places are compared as the system sees them: by
-// canonical path and by device and inode, so that symbolic and hard links, `..`, other spellings
-// and mounts are seen through. A folder that is an input stands for all that lies in it, also by a
-// link. Empty names and names of nothing are passed over: they cannot be read, which their reader
-// says. Touches nothing. Throws RefusedOutput.
+// Refuses an output that would touch what is read. It must not be an input, lie in an input that is
+// a folder, or be a folder that holds an input. Places are compared as the system sees them: by
+// canonical path and by device and inode. Symbolic and hard links, `..`, other spellings and mounts
+// are thus seen through. A folder that is an input stands for all that lies in it, also by a link.
+// Empty names and names of nothing are passed over: they cannot be read, which their reader says.
+// Touches nothing. Throws RefusedOutput.
 void refuse_input_as_output(const std::filesystem::path& output,
                             const std::vector<std::filesystem::path>& inputs);
 

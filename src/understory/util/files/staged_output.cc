@@ -90,7 +90,7 @@ void StagedFolder::commit() {
   if (replaces_) remove_files(former);
 }
 
-std::string with_names_asked_for(std::string message) {
+std::string with_final_names(std::string message) {
   const std::string part = part_path("").string();
   for (const std::string& hidden : {part, std::string(".understory/results/")}) {
     for (std::size_t at = message.find(hidden); at != std::string::npos; at = message.find(hidden))

@@ -10,8 +10,8 @@
 
 namespace understory {
 
-// A file that another part of the program writes from front to back under a name of its own, and
-// that appears whole or not at all. `part` is where to write it, `commit` syncs it to the disk and
+// A file that another part of the program writes from front to back under a name of its own. It
+// appears whole or not at all. `part` is where to write it, `commit` syncs it to the disk and
 // renames it, the destructor drops it otherwise. One process at a time writes it. Not thread-safe.
 class StagedFile {
  public:
@@ -36,8 +36,8 @@ class StagedFile {
 // The same for a folder of files.
 class StagedFolder {
  public:
-  // A folder that is there already is refused unless it is empty, or `may_replace` is given and
-  // holds for the names of all files in it: they go with `commit`. Throws OutputError.
+  // A folder that is there already is refused unless it is empty, or `may_replace` holds for the
+  // names of all files in it. Those go with `commit`. Throws OutputError.
   using NameTest = std::function<bool(const std::string& name)>;
   explicit StagedFolder(const std::filesystem::path& path, const NameTest& may_replace = {});
   ~StagedFolder();
@@ -60,6 +60,6 @@ class StagedFolder {
 
 // A message with the names of files that the user asked for in place of those that they are
 // written under.
-[[nodiscard]] std::string with_names_asked_for(std::string message);
+[[nodiscard]] std::string with_final_names(std::string message);
 
 }  // namespace understory

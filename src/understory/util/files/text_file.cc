@@ -34,8 +34,8 @@ class ReadOnlyFile {
   int value_;
 };
 
-// An alias may name what it stands in, and aliases of aliases grow without limit: whoever walks
-// over the document must not follow them for ever.
+// An alias may name what it stands in, and aliases of aliases grow without limit. A walk over the
+// document must not follow them for ever.
 void check_size(const YAML::Node& node, int depth, std::size_t& left) {
   if (depth > kDeepestYaml)
     throw YAML::ParserException(node.Mark(), "nested in more than 64 levels");

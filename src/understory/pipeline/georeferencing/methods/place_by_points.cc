@@ -74,8 +74,8 @@ std::vector<SurveyedRow> read_points(const GeoreferenceRequest& request, const M
   return rows;
 }
 
-void tell_points(const std::vector<ControlPoint>& points, const ControlFit& fit,
-                 const std::string& file, Placement& placement) {
+void add_point_figures(const std::vector<ControlPoint>& points, const ControlFit& fit,
+                       const std::string& file, Placement& placement) {
   std::string blunders;
   double squares = 0.0;
   std::int64_t used = 0;
@@ -138,7 +138,7 @@ Placement place_by_points(const GeoreferenceRequest& request, const MovableRun& 
   if (!fit.found) throw InputError(request.points.string(), "", fit.reason);
   placement.target_from_world = fit.target_from_world;
   placement.covariance = fit.covariance;
-  tell_points(points, fit, request.points.string(), placement);
+  add_point_figures(points, fit, request.points.string(), placement);
   tell_placement(run.trajectory, placement);
   const double heading_sd_deg = std::get<double>(placement.figures.at("sd_heading_deg"));
   if (heading_sd_deg > kMostHeadingSdDeg)

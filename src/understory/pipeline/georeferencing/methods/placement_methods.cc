@@ -19,7 +19,7 @@ const std::vector<PlacementMethod>& placement_methods() {
   static const std::vector<PlacementMethod> kMethods{
       {GeoreferenceMethod::kAuto, "auto",
        "split, fit3 or closed, by the smallest expected error (gnss-path if no fix has a time of "
-       "the run); with --tree-map or --dem all sources together",
+       "the run). With --tree-map or --dem all sources together",
        place_by_auto},
       {GeoreferenceMethod::kSplit, "split",
        "heading and position from the fixes in the plane, height and tilt separately",

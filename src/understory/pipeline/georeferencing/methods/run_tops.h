@@ -8,10 +8,10 @@
 
 namespace understory {
 
-// Tops of the run's own canopy model (chm.tif) as trees: x, y of the top, z of the ground below it
-// (dtm.tif; NaN where it is not known) and the height above it. World frame, metres. Maps from the
-// air hold tops, and a tree that leans has its top elsewhere than its foot. Empty where the folder
-// holds no canopy model. Throws InputError where it cannot be read.
+// Tops of the run's own canopy model (chm.tif) as trees: x, y of the top and the height above
+// ground. z is that of the ground below (dtm.tif), NaN where unknown. World frame, metres. Maps
+// from the air hold tops, and a tree that leans has its top elsewhere than its foot. Empty where
+// the folder holds no canopy model. Throws InputError where it cannot be read.
 [[nodiscard]] std::vector<Tree> tops_of_run(const std::filesystem::path& folder,
                                             const MovableRun& run);
 

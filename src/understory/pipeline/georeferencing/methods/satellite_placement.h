@@ -19,12 +19,12 @@ struct SatelliteInput {
   SatelliteFitConfig config;
 };
 
-// How far the run's up may be off gravity, degrees: --tilt-sd-deg, else by whether the run was
-// mapped with an IMU or laid on the earth before.
+// How far the run's up may be off gravity, degrees: --tilt-sd-deg. Without it, whether the run had
+// an IMU or was laid on the earth before decides.
 [[nodiscard]] double tilt_sd_deg(const GeoreferenceRequest& request, const MovableRun& run);
 
-// Where the antenna of the fixes is in the body frame, metres: as the request says; else, of the
-// run's own fixes, as run.json says; else at the body's origin. Warns of one that is far off.
+// Where the antenna of the fixes is in the body frame, metres. The request says it, or run.json for
+// the run's own fixes; else it is the body's origin. Warns of one that is far off.
 [[nodiscard]] Eigen::Vector3d antenna_of(const GeoreferenceRequest& request, const MovableRun& run,
                                          Log& log);
 
@@ -34,7 +34,7 @@ struct SatelliteInput {
 [[nodiscard]] SatelliteInput read_satellite_input(const GeoreferenceRequest& request,
                                                   const MovableRun& run, Log& log);
 
-// Warns of headings of a second antenna that contradict the positions: a wrong place of an antenna,
+// Warns of headings of a second antenna that contradict the positions. A wrong place of an antenna,
 // or antennas that are swapped, must not turn the map in silence.
 void warn_of_headings(const UsedHeadings& headings, Log& log);
 

@@ -35,8 +35,8 @@ struct FoundTrees {
 // The middle of the run's trees, by medians; metres, world frame.
 [[nodiscard]] Eigen::Vector2d middle_of_trees(const MovableRun& run);
 
-// Looks for the run's trees near a rough place, or wherever the request says: by its stems and,
-// where it has a canopy model, by its tops. The likelier of both is the result. Throws InputError
+// Looks for the run's trees near a rough place, or wherever the request says. It compares its stems
+// and, where it has a canopy model, its tops. The likelier of both is the result. Throws InputError
 // where the run has too few trees, the map none near the place, or no place is found at all.
 [[nodiscard]] FoundTrees find_trees(const GeoreferenceRequest& request, const MovableRun& run,
                                     const std::optional<RoughPlace>& rough, Log& log);

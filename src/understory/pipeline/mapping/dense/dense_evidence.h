@@ -8,8 +8,8 @@
 
 namespace understory {
 
-// What the dense front end and the reading of its recording say about the map; `evidence.motion`
-// and the figures of the finished path in `evidence.match` are there already.
+// What the dense front end and the reading of its recording say about the map. `evidence.motion`
+// and the finished path's figures in `evidence.match` are there already.
 void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const Recording& source,
                   const Log& log, RunEvidence& evidence);
 

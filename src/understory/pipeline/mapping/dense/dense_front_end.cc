@@ -68,7 +68,7 @@ DenseFrontEnd::DenseFrontEnd(const DenseMappingConfig& config, const SensorTrait
                                             : std::nullopt),
       imu_refined_(conditions.imu_refined),
       opening_(std::make_unique<Opening>()) {
-  if (config.max_memory_mb > 0.0) give_back_what_is_freed();
+  if (config.max_memory_mb > 0.0) return_freed_memory_sooner();
   received_.clock = LidarImuClockCheck(config.odometry.motion.imu);
   if (config.refine_imu) received_.calibration.emplace();
   const LoopClosureConfig& loops = config.keyframe_map.loop_closure.verification;
@@ -222,10 +222,10 @@ void DenseFrontEnd::consider_opening(const Scan& scan, const DenseEstimate& esti
                           estimate.match.target_from_source, opening_->motion,
                           odometry_->uses_imu() && !imu_doubted_);
   }
-  better ? begin_again(*better) : opening_.reset();
+  better ? repeat_opening(*better) : opening_.reset();
 }
 
-void DenseFrontEnd::begin_again(const AssumedMotion& motion) {
+void DenseFrontEnd::repeat_opening(const AssumedMotion& motion) {
   opening_->motion = motion;
   ++opening_->rounds;
   start_anew();
@@ -409,7 +409,7 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
 void DenseFrontEnd::watch_memory() {
   if (!memory_is_short(config_.max_memory_mb)) return;
   map_->free_cache();
-  give_free_memory_back();
+  return_freed_memory();
 }
 
 // Loops have moved the present, too.

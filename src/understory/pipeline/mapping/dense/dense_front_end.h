@@ -49,8 +49,8 @@ struct DenseCounts {
   std::uint64_t last_content = 0;    // of the last scan, see content_of
   std::uint64_t predictions = 0;     // of trajectory_imu.tum
   std::uint64_t coasted = 0;         // those without the IMU, by constant velocity
-  // Of trajectory_partial.tum: parts of scans, those with a match, and the sums of the times from
-  // first to last point, of parts and of the scans that they are of.
+  // Of trajectory_partial.tum: parts of scans, and those with a match. Then the sums of the times
+  // from first to last point, of parts and of the whole scans.
   std::uint64_t scan_parts = 0;
   std::uint64_t scan_parts_matched = 0;
   std::uint64_t cut_scans = 0;
@@ -59,10 +59,9 @@ struct DenseCounts {
   std::uint64_t by_tree_tops = 0;  // scans matched by their tree tops alone
 };
 
-// The front end that matches all points of a scan to a local map: keeps positioning (first graph),
-// keyframes and local map (second graph) and the journal going. The files in `folder` belong to it.
-// `config` is adapted to the sensors (adapt()).
-// Not thread-safe.
+// The front end that matches all points of a scan to a local map. It runs positioning (first
+// graph), keyframes and local map (second graph), and the journal. The files in `folder` belong to
+// it. `config` is adapted to the sensors (adapt()). Not thread-safe.
 class DenseFrontEnd : public FrontEnd {
  public:
   // An IMU that `conditions` refuse or doubt is left out, or is left out until it is clear whether
@@ -158,7 +157,7 @@ class DenseFrontEnd : public FrontEnd {
 
   void refuse_imu(const std::string& reason);
   void take(const Event& event, const Rig& rig);
-  void put_fixes_away();
+  void store_fixes();
   void make_odometry(const Rig& rig);
   void tell_of_imu(TimeNs now);
   void make_satellites();
@@ -173,7 +172,7 @@ class DenseFrontEnd : public FrontEnd {
   void predict_at(TimeNs stamp);
   void match_parts(const Scan& scan);
   void consider_opening(const Scan& scan, const DenseEstimate& estimate);
-  void begin_again(const AssumedMotion& motion);
+  void repeat_opening(const AssumedMotion& motion);
   void leave_out_first();
   void on_scan(const Scan& scan);
   [[nodiscard]] DenseEstimate begin_segment(const Scan& scan, const Pose& about_there);

@@ -1,4 +1,4 @@
-// Poses between scans, as they were known then: predictions at the rate of the IMU (P4 F2), and
+// Poses between scans, as they were known then. Predictions come at the rate of the IMU (P4 F2),
 // estimates from parts of a revolution (P4, discussion).
 #include "understory/pipeline/mapping/dense/dense_front_end.h"
 

@@ -31,7 +31,7 @@ void DenseFrontEnd::make_satellites() {
 void DenseFrontEnd::take_fix(const GnssFix& fix) {
   received_.fixes.push_back(fix);
   // Those of the first scans come again where these are done again.
-  if (started() && settled()) put_fixes_away();
+  if (started() && settled()) store_fixes();
   if (!satellites_) return;
   const Eigen::Vector3d antenna =
       rig_.body_from_gnss ? rig_.body_from_gnss->translation() : Eigen::Vector3d::Zero();

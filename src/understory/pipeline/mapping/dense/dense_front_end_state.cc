@@ -12,7 +12,7 @@ constexpr const char* kFixesFile = "fixes.bin";
 }  // namespace
 
 void DenseFrontEnd::sync() {
-  put_fixes_away();
+  store_fixes();
   if (fixes_file_) fixes_file_->sync();
   if (!started()) return;
   journal_->sync();
@@ -68,7 +68,7 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   if (satellites_) satellites_->save(writer);
 }
 
-void DenseFrontEnd::put_fixes_away() {
+void DenseFrontEnd::store_fixes() {
   if (received_.fixes.empty()) return;
   if (!fixes_file_) fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile);
   for (const GnssFix& fix : received_.fixes) {

@@ -46,8 +46,9 @@ struct DenseMappingConfig {
   JudgementConfig judgement;
   MotionLimits motion_limits;
   double cloud_distance_m = 1.0;  // weighted distance (37) between scans whose clouds are kept
-  // A lidar whose full scans have fewer points than this (16 beams) has what nobody set adapted to
-  // it (adapt()): thinned like dense scans, its scans would leave too few points in a cell.
+  // A lidar whose full scans have fewer points than this (16 beams) gets other settings, where
+  // nobody set them (adapt()). Thinned like dense scans, its scans would leave too few points in a
+  // cell.
   int sparse_scan_points = 60000;
   int lost_after_scans = 30;   // unmatched scans in a row after which a new segment begins
   double max_memory_mb = 0.0;  // resident, MB of 10^6 bytes; 0: no limit

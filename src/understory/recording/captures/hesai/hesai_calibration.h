@@ -21,8 +21,8 @@ void read_hesai_angles(const std::string& path, HesaiCalibration& calibration);
 // Reads a firing time file (CSV: channel, time in microseconds). Throws InputError as above.
 void read_hesai_firing_times(const std::string& path, HesaiCalibration& calibration);
 
-// The calibration of a recording: the angle file that is named, or the .csv beside the recording
-// whose name begins like the recording's or the other way round (walk.pcap: walk.csv,
+// The calibration of a recording: the angle file that is named, or the .csv beside the recording.
+// Its name begins like the recording's, or the other way round (walk.pcap: walk.csv,
 // walk_angles.csv). A firing time file is found in the same way. Which is which their first line
 // tells; others are passed over. Throws InputError if there are several of one kind.
 [[nodiscard]] HesaiCalibration find_hesai_calibration(const std::string& recording,

@@ -12,10 +12,11 @@ namespace understory {
 // Models of Hesai that packets are decoded of.
 enum class HesaiModel { kUnknown, kXt32, kXt16, kPandar64, kQt64 };
 
-// Layout, geometry and timing of the packets of one model. From the user manuals of PandarXT,
-// PandarXT-16, Pandar64 and PandarQT (sections "Data Structure", appendices "Channel Distribution"
-// and "Absolute Time and Laser Firing Time") and the firing time files that Hesai publishes with
-// its SDK. Angles are those of the design: each sensor has a file with its own.
+// Layout, geometry and timing of the packets of one model. They come from the user manuals of
+// PandarXT, PandarXT-16, Pandar64 and PandarQT, and from the firing time files that Hesai publishes
+// with its SDK. The sections are "Data Structure", and the appendices "Channel Distribution" and
+// "Absolute Time and Laser Firing Time". Angles are those of the design: each sensor has a file
+// with its own.
 struct HesaiTable {
   std::string name;
   std::size_t channels = 0;
