@@ -17,7 +17,7 @@ FRONT_END = sys.argv[1]
 SECONDS = 16
 cases = Cases()
 good, messages, truth = good_recording(
-    cases.folder, seconds=SECONDS,
+    seconds=SECONDS,
     more=("gnss.enabled=true", "gnss.rate_hz=2", "mag.enabled=true"))
 start = next(m for m in messages if m.topic == "/lidar").stamp
 OPTIONS = ["--front-end", "sparse"] if FRONT_END == "sparse" else ["--set", "map.enabled=false"]

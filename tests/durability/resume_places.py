@@ -15,7 +15,7 @@ from program import PROGRAM, Cases, good_recording, program  # noqa: E402: found
 from recordings import write_bag, write_capture, write_db3, write_indexed_mcap, write_mcap  # noqa: E402
 
 cases = Cases()
-good, messages, _ = good_recording(cases.folder, seconds=14)
+good, messages, _ = good_recording(seconds=14)
 scans = [message for message in messages if message.type.endswith("PointCloud2")]
 of_ros = [message for message in messages if message.type.split("/")[-1] in ("PointCloud2", "Imu", "TFMessage")]
 OPTIONS = ("--threads", "1", "--set", "run.checkpoint_interval_s=1")

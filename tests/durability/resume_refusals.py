@@ -14,7 +14,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "bad_inp
 from program import PROGRAM, Cases, good_recording, program  # noqa: E402: found by the line above
 
 cases = Cases()
-good, _, _ = good_recording(cases.folder)
+good, _, _ = good_recording()
 OPTIONS = ("--threads", 1, "--set", "run.checkpoint_interval_s=1")
 FILES = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "map.laz", "trees.csv"]
 whole = cases.folder / "whole"
