@@ -16,7 +16,7 @@ import laspy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program
+from program import Cases, program, simulated
 
 cases = Cases()
 A, F = 6378137.0, 1 / 298.257223563
@@ -100,10 +100,7 @@ def tool(name, *words):
     return done.stdout
 
 
-RECORDING = cases.folder / "walk.mcap"
-done = program("simulate", "demo", "-o", RECORDING, "--seed", 4, "--duration-s", 40,
-               *(word for setting in ("lidar.model=VLP-16", *GOOD_SKY) for word in ("--set", setting)))
-assert done.returncode == 0, done.stderr
+RECORDING = simulated("demo", 4, 24, "lidar.model=VLP-16", *GOOD_SKY)
 RUN, LOCAL = cases.folder / "run", cases.folder / "local"
 FIRST = program("map", RECORDING, "-o", RUN)
 SECOND = program("map", RECORDING, "-o", LOCAL, "--set", "georeference.enabled=false")
