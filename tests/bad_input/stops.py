@@ -13,7 +13,7 @@ FILES = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "map.l
 STEM_FILES = ["trajectory.tum", "odometry.tum", "stems.csv.gz", "trees.csv"]
 PATIENCE_S = 30  # far more than a stop takes on a busy machine, far less than the work that is left
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-good, messages, truth = good_recording(seconds=10, more=("stand.size_x_m=40", "stand.size_y_m=40"))
+good, messages, truth = good_recording(seconds=8, more=("stand.size_x_m=40", "stand.size_y_m=40"))
 RUN, STEMS, FIXES = two_runs(good)
 
 
