@@ -184,8 +184,7 @@ def no_extrinsics(folder):
 @cases.case("times of points that run backwards")
 def backwards(folder):
     def spoil(cloud):
-        times = [struct.unpack_from("<I", cloud.points, i * cloud.step + cloud.fields["t"][0])[0]
-                 for i in range(len(cloud))]
+        times = times_of(cloud)
         last = max(times)
         for i, time in enumerate(times):
             cloud.put(i, "t", "I", last - time)
@@ -198,7 +197,8 @@ def backwards(folder):
 
 
 def times_of(cloud):
-    return [struct.unpack_from("<I", cloud.points, i * cloud.step + cloud.fields["t"][0])[0] for i in range(len(cloud))]
+    at = cloud.fields["t"][0]
+    return [row[0] for row in struct.iter_unpack(f"<{at}xI{cloud.step - at - 4}x", cloud.points)]
 
 
 # Short runs of them were complete: the motion within scans is probed too seldom.
