@@ -47,7 +47,7 @@ def killed_among_tiles(recording, run, least):
 
 with tempfile.TemporaryDirectory() as scratch:
     scratch = Path(scratch)
-    recording, free, tight, cut = simulated("handheld", 5, 8), scratch / "free", scratch / "tight", scratch / "cut"
+    recording, free, tight, cut = simulated("handheld", 5, 9), scratch / "free", scratch / "tight", scratch / "cut"
     status = program(*map_command(recording, free)).returncode
     assert status in (0, 4)
 

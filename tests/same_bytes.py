@@ -79,7 +79,7 @@ def prepared(*words):
 
 
 RIDE = simulated("lieksa2", 5, 8)
-WALK = simulated("handheld", 5, 8)
+WALK = simulated("handheld", 5, 9)
 TWO_LIDARS = simulated("harvester2", 5, 4)
 prepared("map", RIDE, "-o", "dense")
 prepared("map", RIDE, "-o", "stems", "--front-end", "sparse")
