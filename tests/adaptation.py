@@ -9,7 +9,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "bad_input"))
 from program import Cases, good_recording, map_recording, program
 
 cases = Cases()
-RECORDING, _, _ = good_recording(cases.folder, seconds=5)
+RECORDING, _, _ = good_recording(seconds=5)
 VOXEL = "preprocess.voxel.voxel_size_m"
 SETTINGS = ("--set", f"{VOXEL}=0.4", "--set", "registration.ndt.volume_weight=0.03")
 

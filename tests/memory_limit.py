@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "bad_input"))
-from program import PROGRAM, program
+from program import PROGRAM, program, simulated
 
 SAME = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "gnss.csv", "map.laz", "trees.csv", "stem_curves.csv", "dtm.tif",
         "chm.tif", "dsm.tif"]
@@ -48,8 +48,7 @@ def killed_among_tiles(recording, run, least):
 
 with tempfile.TemporaryDirectory() as scratch:
     scratch = Path(scratch)
-    recording, free, tight, cut = scratch / "r.mcap", scratch / "free", scratch / "tight", scratch / "cut"
-    assert program("simulate", "handheld", "-o", recording, "--seed", "5", "--duration-s", "9").returncode == 0
+    recording, free, tight, cut = simulated("handheld", 5, 9), scratch / "free", scratch / "tight", scratch / "cut"
     status = program(*map_command(recording, free)).returncode
     assert status in (0, 4)
 

@@ -2,7 +2,6 @@
 Runs are of a harvester's scans with an IMU, of sparse scans without one, and by stems alone with
 either."""
 
-import os
 import pathlib
 import signal
 import subprocess
@@ -10,27 +9,30 @@ import sys
 import tempfile
 import time
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "bad_input"))
+from program import PROGRAM, simulated
+
 DENSE = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "gnss.csv", "global.csv.gz", "map.laz", "trees.csv"]
 STEMS = ["stems.csv.gz", "trajectory.tum", "odometry.tum", "steps.csv", "gnss.csv", "global.csv.gz", "corrections.csv", "loops.csv",
          "trees.csv", "felled.csv"]
 # Recording, a file that shows how far the run is, its least size then, options, files to compare.
 CASES = {
-    "harvester": ("sim:harvester?seed=21&duration_s=16", "journal.bin", 40_000, ["--imu-rate", "--set", "scan_fraction=0.25", "--set", "output.world_frame=ned"],
+    "harvester": (("harvester", 21, 16), "journal.bin", 40_000, ["--imu-rate", "--set", "scan_fraction=0.25", "--set", "output.world_frame=ned"],
                   [*DENSE, "trajectory_imu.tum", "trajectory_partial.tum"]),
     # What is adapted to sparse scans and what the user set of it are the same after the kill.
-    "sparse_scans": ("sim:lieksa2?seed=21&duration_s=60", "journal.bin", 60_000,
+    "sparse_scans": (("lieksa2", 21, 60), "journal.bin", 60_000,
                      ["--set", "keyframe.distance_m=0.4"], DENSE),
-    "stems": ("sim:lieksa2?seed=21&duration_s=120", "views.bin", 200_000,
+    "stems": (("lieksa2", 21, 60), "views.bin", 100_000,
               ["--front-end", "sparse", "--set", "run.checkpoint_interval_s=2"], STEMS),
-    "stems_imu": ("sim:harvester?seed=21&duration_s=30", "views.bin", 100_000,
+    "stems_imu": (("harvester", 21, 24), "views.bin", 80_000,
                   ["--front-end", "sparse", "--set", "run.checkpoint_interval_s=2"], STEMS),
 }
-program = os.environ["UNDERSTORY_PROGRAM"]
-recording, growing, min_bytes, options, files = CASES[sys.argv[1]]
+site, growing, min_bytes, options, files = CASES[sys.argv[1]]
+recording = str(simulated(*site))
 
 
 def start(folder, threads):
-    command = [program, "map", recording, "-o", str(folder), "--threads", str(threads), "--quiet", *options]
+    command = [PROGRAM, "map", recording, "-o", str(folder), "--threads", str(threads), "--quiet", *options]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL)
 
 
@@ -50,7 +52,7 @@ with tempfile.TemporaryDirectory() as scratch:
         run.send_signal(signal.SIGKILL)
         assert run.wait() == -signal.SIGKILL, "the run had ended before it could be killed"
         assert not (killed / "trajectory.tum").exists()
-    command = [program, "map", "--resume", str(killed), "--threads", "1", "--quiet"]
+    command = [PROGRAM, "map", "--resume", str(killed), "--threads", "1", "--quiet"]
     assert subprocess.run(command, stdout=subprocess.DEVNULL).returncode in (0, 4)
     different = [f for f in files if (whole / f).read_bytes() != (killed / f).read_bytes()]
     assert not different, f"{different} differ"

@@ -9,11 +9,9 @@ import re
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent / "bad_input"))
-from program import Cases, program
+from program import Cases, program, simulated
 
 THREADS = (1, 2, 4)
-SITE = "sim:lieksa2?seed=5&duration_s=12"
-WALK = "sim:handheld?seed=5&duration_s=8"
 # Keys of run.json that tell of the machine's work, not of the result.
 TIMED_KEYS = {"wall_s", "cpu_s", "process", "peak_memory_mb", "stages", "threads", "memory_mb"}
 TIMED_FIGURE = re.compile(r"(_ms|_cpu_s|_wall_s|memory_mb)(_|$)|^(scan_cpu|scan_wall|memory|latency)_")
@@ -80,12 +78,14 @@ def prepared(*words):
     assert done.returncode in (0, 4), done.stderr
 
 
-prepared("simulate", "lieksa2", "-o", "walk.mcap", "--seed", 5, "--duration-s", 12)
-prepared("map", "walk.mcap", "-o", "dense")
-prepared("map", "walk.mcap", "-o", "stems", "--front-end", "sparse")
+RIDE = simulated("lieksa2", 5, 8)
+WALK = simulated("handheld", 5, 9)
+TWO_LIDARS = simulated("harvester2", 5, 4)
+prepared("map", RIDE, "-o", "dense")
+prepared("map", RIDE, "-o", "stems", "--front-end", "sparse")
 prepared("map", "sim:skidoo?seed=5&duration_s=8", "-o", "ride")
 prepared("georeference", "ride", "-o", "globe", "--method", "gnss-path")
-prepared("convert", "walk.mcap", "clouds", "--format", "ply")
+prepared("convert", RIDE, "clouds", "--format", "ply")
 clouds = [f"../../clouds/{i:06}.ply" for i in (0, 4)]
 stand = [(7.0 * math.cos(k * k) * math.sqrt(k), 7.0 * math.sin(k * k) * math.sqrt(k), 0.1 * math.sin(k)) for k in range(60)]
 for name, shift in (("a.ply", 0.0), ("b.ply", 0.4)):
@@ -97,13 +97,13 @@ sparse_pair = ("../../a.ply", "../../b.ply")
 COMMANDS = {
     "simulate": ("simulate", "lieksa2", "-o", "walk.mcap", "--seed", 5, "--duration-s", 3),
     "map, dense": ("map", WALK, "-o", "run", "--copc"),
-    "map, sparse scans": ("map", SITE, "-o", "run"),
-    "map, two lidars": ("map", "sim:harvester2?seed=5&duration_s=5", "-o", "run", "--lidar-topic", "/lidar,/lidar_2"),
-    "map, by stems": ("map", SITE, "-o", "run", "--front-end", "sparse"),
-    "convert to clouds": ("convert", "../../walk.mcap", "clouds"),
-    "convert to stems": ("convert", "../../walk.mcap", "stems.csv.gz"),
-    "convert to MCAP": ("convert", "../../walk.mcap", "walk.mcap"),
-    "info": ("info", "../../walk.mcap", "--json"),
+    "map, sparse scans": ("map", RIDE, "-o", "run"),
+    "map, two lidars": ("map", TWO_LIDARS, "-o", "run", "--lidar-topic", "/lidar,/lidar_2"),
+    "map, by stems": ("map", RIDE, "-o", "run", "--front-end", "sparse"),
+    "convert to clouds": ("convert", RIDE, "clouds"),
+    "convert to stems": ("convert", RIDE, "stems.csv.gz"),
+    "convert to MCAP": ("convert", RIDE, "walk.mcap"),
+    "info": ("info", RIDE, "--json"),
     "correct stems": ("correct", "../../stems/stems.csv.gz", "-o", "run"),
     "correct a run": ("correct", "../../stems", "-o", "run"),
     "inventory of a run": ("inventory", "../../dense", "-o", "stand"),
@@ -114,8 +114,8 @@ COMMANDS = {
     "register, Go-ICP": ("register", *sparse_pair, "--method", "go-icp", "--json"),
     "register by stems": ("register", *sparse_pair, "--method", "stem-icp", "--json"),
     "merge": ("merge", "../../stems", "../../stems", "-o", "both"),
-    "evaluate": ("evaluate", "../../dense", "../../walk.truth", "--align", "se3", "--json"),
-    "evaluate trees": ("evaluate", "trees", "../../dense", "../../walk.truth", "--align", "yaw", "--json"),
+    "evaluate": ("evaluate", "../../dense", RIDE.with_suffix(".truth"), "--align", "se3", "--json"),
+    "evaluate trees": ("evaluate", "trees", "../../dense", RIDE.with_suffix(".truth"), "--align", "yaw", "--json"),
     "evaluate map": ("evaluate", "map", "../../stems/stems.csv.gz", "../../stems", "--json"),
     "evaluate map of a cloud": ("evaluate", "map", "../../dense", "--json"),
     "georeference on a path": ("georeference", "../../ride", "-o", "placed", "--method", "gnss-path"),

@@ -14,10 +14,10 @@ from program import PROGRAM, Cases, Outcome, error_m, good_recording, program
 from recordings import edit_imu, write_bag, write_db3, write_indexed_mcap, write_mcap
 
 FRONT_END = sys.argv[1]
-SECONDS = 16
+SECONDS = 13
 cases = Cases()
 good, messages, truth = good_recording(
-    cases.folder, seconds=SECONDS,
+    seconds=SECONDS,
     more=("gnss.enabled=true", "gnss.rate_hz=2", "mag.enabled=true"))
 start = next(m for m in messages if m.topic == "/lidar").stamp
 OPTIONS = ["--front-end", "sparse"] if FRONT_END == "sparse" else ["--set", "map.enabled=false"]
@@ -69,7 +69,7 @@ def near_undisturbed(outcome, *keys):
 
 
 FIXES, FIELD = ("/gnss", "/gnss/quality"), ("/mag",)
-for seconds in (0.5, 2, 5, -0.5, -2, -5) if FRONT_END == "dense" else (2, -5):
+for seconds in (0.5, 5, -0.5, -2) if FRONT_END == "dense" else (2, -5):
     @cases.case(f"fixes {seconds} s ahead and magnetometer as much behind")
     def slow_sensors(folder, seconds=seconds):
         spoilt = [m.stamped(m.stamp - round(seconds * 1e9)) if m.topic in FIELD else m
@@ -85,7 +85,7 @@ for seconds in (0.5, 2, 5, -0.5, -2, -5) if FRONT_END == "dense" else (2, -5):
                 assert abs(mended + offset) < 0.15 or (offset == -0.5 and mended == 0), (name, mended)
         return near_undisturbed(outcome, "time.clock_offset")
 
-for seconds in (0.5, 2, 5, -0.5, -2, -5) if FRONT_END == "dense" else (2, -0.5):
+for seconds in (0.5, 2, -5) if FRONT_END == "dense" else (2, -0.5):
     @cases.case(f"IMU {seconds} s ahead")
     def imu_offset(folder, seconds=seconds):
         outcome = mapped(folder, off(("/imu",), seconds))
@@ -228,7 +228,7 @@ def recorded_twice(folder):
 
 @cases.case("a lidar that stops 4 s before the IMU and the receiver")
 def lidar_stops(folder):
-    outcome = mapped(folder, [m for m in messages if m.topic != "/lidar" or second(m) < SECONDS - 4])
+    outcome = mapped(folder, [m for m in messages if m.topic != "/lidar" or second(m) < SECONDS - 3.95])
     reasons = "; ".join(outcome.run["reasons"])
     assert outcome.code == 4 and outcome.run["status"] == "partial", reasons
     assert "the lidar stopped 4.0 s before the " in reasons, reasons

@@ -10,7 +10,7 @@ from program import PROGRAM, Cases, error_m, good_recording, map_recording, prog
 from recordings import write_mcap
 
 cases = Cases()
-good, messages, truth = good_recording(cases.folder)
+good, messages, truth = good_recording()
 FILES = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "map.laz", "trees.csv"]
 whole = cases.folder / "whole"
 assert program("map", good, "-o", whole).returncode == 0

@@ -11,7 +11,7 @@ from program import Cases, error_m, good_recording, map_recording, program
 from recordings import Cloud, edit_cloud, edit_imu, write_mcap
 
 cases = Cases()
-good, messages, truth = good_recording(cases.folder, seconds=24)
+good, messages, truth = good_recording(seconds=24)
 scans = [m for m in messages if m.topic == "/lidar"]
 start = scans[0].stamp
 short = [m for m in messages if m.time < start + 12e9]
@@ -184,8 +184,7 @@ def no_extrinsics(folder):
 @cases.case("times of points that run backwards")
 def backwards(folder):
     def spoil(cloud):
-        times = [struct.unpack_from("<I", cloud.points, i * cloud.step + cloud.fields["t"][0])[0]
-                 for i in range(len(cloud))]
+        times = times_of(cloud)
         last = max(times)
         for i, time in enumerate(times):
             cloud.put(i, "t", "I", last - time)
@@ -198,7 +197,8 @@ def backwards(folder):
 
 
 def times_of(cloud):
-    return [struct.unpack_from("<I", cloud.points, i * cloud.step + cloud.fields["t"][0])[0] for i in range(len(cloud))]
+    at = cloud.fields["t"][0]
+    return [row[0] for row in struct.iter_unpack(f"<{at}xI{cloud.step - at - 4}x", cloud.points)]
 
 
 # Short runs of them were complete: the motion within scans is probed too seldom.
@@ -336,14 +336,14 @@ def outage_of_both(folder):
 @cases.case("sensors that are suddenly elsewhere")
 def elsewhere(folder):
     """From one scan to the next in another stand, as when two recordings were joined."""
-    _, other, _ = good_recording(folder, seconds=12, seed=9)
+    _, other, true_there = good_recording(seconds=12, seed=9)
     _, outcome = mapped(folder, [m for m in short if m.time < start + 6e9] + [
         m for m in other if m.time >= start + 6e9 and m.topic != "/tf_static"])
     assert outcome.code == 4 and outcome.run["counts"]["segments"] == 2, outcome.said
     assert outcome.run["counts"]["segments_joined"] == 0, outcome.run["counts"]
     assert "could not be matched" in outcome.said and "lost at 17000000" in outcome.said
     errors = [error_of_part(outcome, folder, 0, 6),
-              error_of_part(outcome, folder, 9, 12, folder / "first.truth")]
+              error_of_part(outcome, folder, 9, 12, true_there)]
     assert max(errors) < 0.1, errors
     return f"exit 4, two pieces of {100 * errors[0]:.1f} and {100 * errors[1]:.1f} cm"
 

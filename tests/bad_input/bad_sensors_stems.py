@@ -8,7 +8,7 @@ from program import Cases, good_recording, program
 from recordings import edit_cloud, edit_imu, write_mcap
 
 cases = Cases()
-good, messages, truth = good_recording(cases.folder, seconds=24)
+good, messages, truth = good_recording(seconds=16)
 
 
 def mapped(recording, run, *options):

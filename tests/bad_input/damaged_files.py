@@ -8,7 +8,7 @@ from program import Cases, error_m, good_recording, map_recording, program, unfi
 from recordings import write_bag, write_capture, write_db3, write_mcap
 
 cases = Cases()
-good, messages, truth = good_recording(cases.folder)
+good, messages, truth = good_recording()
 scans = [m for m in messages if m.topic == "/lidar"]
 ALL = len(scans)
 plain = cases.folder / "plain.mcap"

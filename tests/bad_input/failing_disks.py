@@ -18,7 +18,7 @@ if not LIBRARY.exists():
     raise SystemExit(77)
 
 cases = Cases()
-good, messages, truth = good_recording(cases.folder, seconds=6)
+good, messages, truth = good_recording(seconds=6)
 scans = [m for m in messages if m.topic == "/lidar"]
 bag, db3, capture = (cases.folder / name for name in ("walk.bag", "walk.db3", "walk.pcap"))
 write_bag(bag, messages)

@@ -2,9 +2,12 @@
 docs/reference/troubleshooting.md: 0 mended or harmless, 3 nothing usable, 4 not to be trusted or partial."""
 
 import concurrent.futures
+import fcntl
+import hashlib
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import tempfile
 
@@ -50,17 +53,61 @@ def snapshot(folder):
             for path in sorted(folder.rglob("*"))}
 
 
-def two_runs(folder, recording):
-    """The recording mapped by both front ends, and fixes along its path: (run, run by stems, fixes)."""
-    run, stems, fixes = folder / "run", folder / "stems", folder / "fixes.csv"
-    done = program("map", recording, "-o", run)
-    assert done.returncode == 0, done.stderr
-    done = program("map", recording, "-o", stems, "--front-end", "sparse")
-    assert done.returncode in (0, 4), done.stderr
-    fixes.write_text("timestamp,latitude_deg,longitude_deg,height_m\n" + "".join(
-        f"{line.split()[0]},{62 + float(line.split()[2]) / 111e3:.9f},{29 + float(line.split()[1]) / 52e3:.9f},100\n"
-        for line in (run / "trajectory.tum").read_text().splitlines()[::10]))
-    return run, stems, fixes
+def made_once(words, make):
+    """A folder that `make(folder)` fills once for all tests of this build. Its name tells `words`, the program and this
+    file, so that another program makes it anew. Tests read what lies there, and write elsewhere."""
+    shared = pathlib.Path(os.environ.get("UNDERSTORY_BUILD", pathlib.Path(PROGRAM).parent)) / "tests" / "recordings"
+    shared.mkdir(parents=True, exist_ok=True)
+    made_by = hashlib.sha256()
+    for file in (PROGRAM, __file__):
+        made_by.update(pathlib.Path(file).read_bytes())
+    made_by = made_by.hexdigest()[:12]
+    name = f"{made_by}-{hashlib.sha256(repr(words).encode()).hexdigest()[:16]}"
+    with open(shared / "lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        for path in shared.glob("*-*"):
+            if not path.name.startswith(made_by):
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+        own = open(shared / f"{name}.lock", "w")
+    with own:
+        fcntl.flock(own, fcntl.LOCK_EX)
+        if not (shared / name).exists():
+            half = pathlib.Path(tempfile.mkdtemp(prefix=f"{name}.", dir=shared))
+            make(half)
+            half.rename(shared / name)
+    return shared / name
+
+
+def simulated(site, seed, seconds, *settings):
+    """A recording that `simulate` wrote with those settings, its truth beside it in walk.truth; shared by all tests."""
+    def make(folder):
+        done = program("simulate", site, "-o", folder / "walk.mcap", "--seed", seed, "--duration-s", seconds,
+                       *(word for setting in settings for word in ("--set", setting)))
+        assert done.returncode == 0, done.stderr
+    return made_once(("simulate", site, seed, seconds, *settings), make) / "walk.mcap"
+
+
+def unpacked(recording):
+    """The same recording in chunks that are not compressed, for read_mcap."""
+    def make(folder):
+        done = program("convert", recording, folder / "good.mcap", "--compression", "none")
+        assert done.returncode == 0, done.stderr
+    return made_once(("unpacked", str(recording)), make) / "good.mcap"
+
+
+def two_runs(recording):
+    """The recording mapped by both front ends, and fixes along its path: (run, run by stems, fixes). Shared, to be read."""
+    def make(folder):
+        run, stems = folder / "run", folder / "stems"
+        done = program("map", recording, "-o", run)
+        assert done.returncode == 0, done.stderr
+        done = program("map", recording, "-o", stems, "--front-end", "sparse")
+        assert done.returncode in (0, 4), done.stderr
+        (folder / "fixes.csv").write_text("timestamp,latitude_deg,longitude_deg,height_m\n" + "".join(
+            f"{line.split()[0]},{62 + float(line.split()[2]) / 111e3:.9f},{29 + float(line.split()[1]) / 52e3:.9f},100\n"
+            for line in (run / "trajectory.tum").read_text().splitlines()[::10]))
+    made = made_once(("two runs", str(recording)), make)
+    return made / "run", made / "stems", made / "fixes.csv"
 
 
 def unfinished_run(folder, checkpoint=b"half"):
@@ -72,15 +119,11 @@ def unfinished_run(folder, checkpoint=b"half"):
     return work / "checkpoint.bin"
 
 
-def good_recording(folder, seconds=12, seed=5, more=()):
+def good_recording(seconds=12, seed=5, more=()):
     """Some seconds on foot with a VLP-16 and an IMU: (file, its messages, truth). `more` settings."""
-    first, path = folder / "first.mcap", folder / "good.mcap"
-    settings = [word for setting in (f"duration_s={seconds}", f"seed={seed}", *SITE, *more) for word in ("--set", setting)]
-    for words in (("simulate", "demo", "-o", first, *settings),
-                  ("convert", first, path, "--compression", "none")):
-        done = program(*words)
-        assert done.returncode == 0, done.stderr
-    return path, read_mcap(path), folder / "first.truth"
+    recording = simulated("demo", seed, seconds, *SITE, *more)
+    path = unpacked(recording)
+    return path, read_mcap(path), recording.with_suffix(".truth")
 
 
 def error_m(outcome, truth):

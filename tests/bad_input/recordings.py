@@ -32,6 +32,13 @@ class Message:
         return dataclasses.replace(self.at(stamp), time=self.time)
 
 
+def late_imu(messages, offset_s, seconds):
+    """The first seconds of a recording. The stamps of its IMU are late by the offset."""
+    begin, late = min(message.time for message in messages), round(1e9 * offset_s)
+    return [message.stamped(message.stamp + late) if message.topic == "/imu" else message
+            for message in messages if message.time < begin + 1e9 * seconds]
+
+
 class Cdr:
     """A reader of little-endian CDR that knows where each value lies."""
 

@@ -6,10 +6,12 @@ import json
 import math
 import random
 
-from program import Cases, program
+from program import Cases, program, simulated
 
 cases = Cases()
 SIDE = 20.0
+WALK = simulated("demo", 6, 16, "lidar.model=VLP-16", "gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02",
+                 "gnss.white_sd_m=0.02")  # that of world_frame.py
 
 
 def places(seed, count=24):
@@ -107,7 +109,7 @@ def map_in_degrees(folder):
     figures = {}
     for name, options in (("metres", ()), ("degrees", ("--crs", "EPSG:4979")), ("feet", ("--crs", "EPSG:6885"))):
         run = folder / name
-        done = program("map", "sim:handheld?seed=5&duration_s=15", "-o", run, *options)
+        done = program("map", WALK, "-o", run, *options)
         assert done.returncode == 0, (name, done)
         done = program("evaluate", "map", run, "--json")
         assert done.returncode == 0, (name, done)

@@ -36,7 +36,7 @@ def lost(run, former):
 
 with tempfile.TemporaryDirectory() as scratch:
     scratch = pathlib.Path(scratch).resolve()
-    recording, _, _ = good_recording(scratch, seconds=4)
+    recording, _, _ = good_recording(seconds=4)
     top = scratch / "disk"
     top.mkdir()
     disk = Disk(top)

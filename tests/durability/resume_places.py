@@ -15,11 +15,13 @@ from program import PROGRAM, Cases, good_recording, program  # noqa: E402: found
 from recordings import write_bag, write_capture, write_db3, write_indexed_mcap, write_mcap  # noqa: E402
 
 cases = Cases()
-good, messages, _ = good_recording(cases.folder, seconds=14)
+good, messages, _ = good_recording(seconds=14)
 scans = [message for message in messages if message.type.endswith("PointCloud2")]
 of_ros = [message for message in messages if message.type.split("/")[-1] in ("PointCloud2", "Imu", "TFMessage")]
 OPTIONS = ("--threads", "1", "--set", "run.checkpoint_interval_s=1")
-DENSE = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz", "map.laz", "trees.csv"]
+PATH = ["trajectory.tum", "keyframes.tum", "graph.g2o", "states.csv.gz"]
+DENSE = [*PATH, "map.laz", "trees.csv"]
+NO_MAP = ("--set", "map.enabled=false")
 STEMS = ["stems.csv.gz", "trajectory.tum", "odometry.tum", "steps.csv", "trees.csv"]
 # Behind what is looked at to learn what the recording holds, and before where the runs are killed.
 SPOILT_S = (3.5, 5.5)
@@ -30,7 +32,7 @@ def killed(recording, run, options):
     """Kills `map` once it has positioned `LEAST_S` of the recording and some more."""
     process = subprocess.Popen([PROGRAM, "--quiet", "map", str(recording), "-o", str(run), *OPTIONS, *options],
                                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    growing, least = ("views.bin", 175_000) if options else ("journal.bin", 28_000)
+    growing, least = ("views.bin", 175_000) if "sparse" in options else ("journal.bin", 28_000)
     for _ in range(60_000):
         if process.poll() is not None or any(p.stat().st_size > least for p in run.rglob(growing)):
             break
@@ -59,7 +61,7 @@ def parts_of_scans(begin_s, end_s):
             yield bytes(scan.data[100_000:103_000])
 
 
-def goes_on(folder, recording, spoil_it, files=DENSE, options=()):
+def goes_on(folder, recording, spoil_it, files=PATH, options=NO_MAP):
     whole, run = folder / "whole", folder / "run"
     done = program("map", recording, "-o", whole, *OPTIONS, *options)
     assert done.returncode in (0, 4), done.stderr
@@ -84,7 +86,7 @@ def in_one_file(path):
 @cases.case("MCAP")
 def mcap(folder):
     write_indexed_mcap(folder / "r.mcap", messages)
-    return goes_on(folder, folder / "r.mcap", in_one_file)
+    return goes_on(folder, folder / "r.mcap", in_one_file, DENSE, ())
 
 
 @cases.case("MCAP by stems")

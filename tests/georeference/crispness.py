@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program
+from program import Cases, program, simulated
 
 import laspy
 import numpy
@@ -27,17 +27,14 @@ def answer(*words):
 
 @cases.case("with bursts and jumps fused, the cloud is as crisp and the path as good as without positions")
 def crisp(folder):
-    walk = folder / "walk.mcap"
-    settings = [word for setting in SITE for word in ("--set", setting)]
-    done = program("simulate", "demo", "-o", walk, "--seed", 7, "--duration-s", 40, *settings)
-    assert done.returncode == 0, done.stderr
+    walk = simulated("demo", 7, 25, *SITE)
     entropy, ape = {}, {}
     for use in ("georeference", "fuse"):
         run = folder / use
         done = program("map", walk, "-o", run, "--set", f"gnss.use={use}")
         assert done.returncode in (0, 4), done.stderr
         entropy[use] = answer("evaluate", "map", run)["mean_entropy_nats"]
-        ape[use] = answer("evaluate", run, folder / "walk.truth", "--align", "se3")["ape_rmse_m"]
+        ape[use] = answer("evaluate", run, walk.with_suffix(".truth"), "--align", "se3")["ape_rmse_m"]
     print(entropy, ape)
     # The positions were there, and counted: else the clouds would be alike without proof.
     facts = json.loads((folder / "fuse" / "run.json").read_text())

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program
+from program import Cases, program, simulated
 
 cases = Cases()
 ANTENNAS = ("gnss.mount_m=[0.2,-0.3,0.4]", "gnss.second_antenna_m=[0.1,0.8,0.05]")
@@ -17,11 +17,8 @@ ANTENNAS = ("gnss.mount_m=[0.2,-0.3,0.4]", "gnss.second_antenna_m=[0.1,0.8,0.05]
 RECEIVER = ("gnss.open_sd_m=1.5", "gnss.canopy_sd_m=1", "gnss.correlation_s=30")
 
 
-def simulated(name, site, seconds, *settings):
-    words = [word for setting in ("lidar.model=VLP-16", *ANTENNAS, *RECEIVER, *settings) for word in ("--set", setting)]
-    done = program("simulate", site, "-o", cases.folder / f"{name}.mcap", "--seed", 5, "--duration-s", seconds, *words)
-    assert done.returncode == 0, done.stderr
-    return cases.folder / f"{name}.mcap"
+def recorded(site, seconds, *settings):
+    return simulated(site, 5, seconds, "lidar.model=VLP-16", *ANTENNAS, *RECEIVER, *settings)
 
 
 def yaw_of(x, y, z, w):
@@ -51,7 +48,7 @@ def warned(facts, kind):
     return [warning for warning in facts["warnings"] if warning["key"] == kind]
 
 
-WALK = simulated("walk", "demo", 25)
+WALK = recorded("demo", 25)
 
 
 @cases.case("the heading is right within what is stated, and better than by positions alone")
@@ -94,7 +91,7 @@ def swapped(folder):
 
 @cases.case("a machine that stands is placed by its heading, and not without")
 def standing(folder):
-    recording = simulated("still", "harvester", 12, "carrier.still_s=60")
+    recording = recorded("harvester", 8, "carrier.still_s=60")
     facts = mapped(recording, folder / "run")
     place = facts["georeference"]
     assert place["on_globe"], place
@@ -103,7 +100,7 @@ def standing(folder):
     print(f"standing: off by {error:.2f} degrees, stated {place['heading_sd_deg']:.2f}")
     assert abs(error) < 3 * place["heading_sd_deg"], (error, place)
     assert facts["quality"]["global_heading_known_percent"] > 50, facts["quality"]
-    bare = simulated("bare", "harvester", 12, "carrier.still_s=60", "gnss.second_antenna_m=[0,0,0]")
+    bare = recorded("harvester", 8, "carrier.still_s=60", "gnss.second_antenna_m=[0,0,0]")
     place = mapped(bare, folder / "bare")["georeference"]
     assert not place["on_globe"] and "to tell the heading" in place["reason"], place
 
@@ -119,7 +116,7 @@ def fused(folder):
 # Two receivers that give positions: they err alike by a metre, and each by centimetres. They promise one.
 POSITIONS = ("gnss.second_antenna_positions=true", "gnss.second_antenna_common=0.9992", "gnss.open_sd_m=1",
              "gnss.canopy_sd_m=0", "gnss.white_sd_m=0.005", "gnss.reported_factor=0.01")
-PAIR = simulated("pair", "demo", 25, *POSITIONS)
+PAIR = recorded("demo", 25, *POSITIONS)
 LINE_DEG = math.degrees(math.atan2(0.8, 0.1))  # of the second antenna in the body's plane, from x to y
 
 
@@ -157,7 +154,7 @@ def positions(folder):
 
 @cases.case("a machine that stands is placed by the positions of two antennas, and says so while it runs")
 def standing_positions(folder):
-    recording = simulated("still_pair", "harvester", 12, "carrier.still_s=60", *POSITIONS)
+    recording = recorded("harvester", 8, "carrier.still_s=60", *POSITIONS)
     facts = mapped(recording, folder / "run")
     place = facts["georeference"]
     assert place["on_globe"] and place["heading_sd_deg"] < 5, place

@@ -9,6 +9,7 @@ same_bytes.py.
 import json
 import os
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -16,6 +17,9 @@ import laspy
 import lazrs
 import numpy as np
 from laspy.copc import Bounds
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
+from program import simulated
 
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 COLUMNS = ("X", "Y", "Z", "gps_time", "intensity", "classification")
@@ -142,8 +146,7 @@ def check_refusals(folder, walk):
 
 with tempfile.TemporaryDirectory() as room:
     folder = Path(room)
-    walk = folder / "walk.mcap"
-    run("simulate", "skidoo", "-o", walk, "--seed", 5, "--duration-s", 10)
+    walk = simulated("skidoo", 5, 10)
     run("map", walk, "-o", folder / "run", "--copc")
     print("map:", check(folder / "run", trees=False))
     facts = json.loads((folder / "run/run.json").read_text())

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program
+from program import Cases, program, simulated
 
 cases = Cases()
 PATHS = ("trajectory.tum", "trajectory_imu.tum", "trajectory_partial.tum", "keyframes.tum", "odometry.tum")
@@ -129,11 +129,9 @@ def both(*arguments, codes=(0,), **runs):
     return said
 
 
-RECORDING = cases.folder / "walk.mcap"
-made = program("simulate", "demo", "-o", RECORDING, "--seed", 6, "--duration-s", 25, "--set", "lidar.model=VLP-16",
-               "--set", "gnss.canopy_sd_m=0.02", "--set", "gnss.open_sd_m=0.02", "--set", "gnss.white_sd_m=0.02")
-assert made.returncode == 0, made.stderr
-TRUTH = cases.folder / "walk.truth"
+RECORDING = simulated("demo", 6, 16, "lidar.model=VLP-16", "gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02",
+                      "gnss.white_sd_m=0.02")
+TRUTH = RECORDING.with_suffix(".truth")
 DENSE_RUNS = mapped("dense", RECORDING, "--imu-rate", "--set", "scan_fraction=0.5", "--inventory", "full", "--plot-grid", 10)
 STEM_RUNS = mapped("stems", RECORDING, "--front-end", "sparse", "--set", "harvester.fells=true")
 

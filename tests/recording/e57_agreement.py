@@ -103,7 +103,7 @@ def add_scaled_scan(file, points):
 
 with tempfile.TemporaryDirectory() as scratch:
     room = Path(scratch)
-    run("map", "sim:demo?seed=3&duration_s=20", "-o", room / "run")
+    run("map", "sim:demo?seed=3&duration_s=12&lidar.columns=512", "-o", room / "run")
     points = laspy.read(room / "run" / "map.laz").xyz
     points = points - np.round(np.median(points, axis=0))  # they are in a coordinate system
     points = points[np.abs(points).max(axis=1) < 50.0]

@@ -19,6 +19,9 @@ cases = Cases()
 SITE = cases.folder / "site"
 VIEWS = write_strip_roads(SITE, seed=3)
 STEMS = SITE / "stems.csv.gz"
+# One road of 60 m, where it does not matter what the map is like.
+SMALL = cases.folder / "small"
+SMALL_VIEWS = write_strip_roads(SMALL, seed=7, roads=Roads(roads=1, length_m=60.0))
 LINES = gzip.decompress(STEMS.read_bytes()).decode().splitlines()
 
 
@@ -118,7 +121,7 @@ def methods(folder):
 @cases.case("same bytes with one thread and with two")
 def threads(folder):
     for count in (1, 2):
-        assert correct(STEMS, folder / str(count), "--threads", count).returncode == 0
+        assert correct(SMALL / "stems.csv.gz", folder / str(count), "--threads", count).returncode == 0
     names = {p.name for p in (folder / "1").iterdir()}
     assert names == {p.name for p in (folder / "2").iterdir()} and len(names - TIMED) >= 4, names
     for name in names - TIMED:
@@ -155,8 +158,7 @@ def go_icp(folder):
 @cases.case("views that hurt the map are left out of it")
 def eliminated(folder):
     """One view in ten is put 0.35 m beside its place among the scans of a run."""
-    site, run = folder / "site", folder / "run"
-    views = write_strip_roads(site, seed=7, roads=Roads(roads=1, length_m=60.0))
+    site, run, views = SMALL, folder / "run", SMALL_VIEWS
     run.mkdir()
     (run / "stems.csv.gz").write_bytes((site / "stems.csv.gz").read_bytes())
     (run / "run.json").write_text('{"command": "map", "version": "0.1.0", "status": "complete", "reasons": []}')
@@ -317,10 +319,10 @@ def unfinished(folder):
     work.mkdir(parents=True)
     (work / "marker").write_text("Understory: work folder of a run\nformat: 1\n")
     (work / "checkpoint.bin").write_bytes(b"half")
-    done = correct(STEMS, run)
+    done = correct(SMALL / "stems.csv.gz", run)
     assert done.returncode == 3 and str(run) in done.stderr, done.stderr
     assert (work / "checkpoint.bin").read_bytes() == b"half"
-    assert correct(STEMS, run, "--overwrite").returncode == 0
+    assert correct(SMALL / "stems.csv.gz", run, "--overwrite").returncode == 0
     assert (run / "trajectory.tum").exists() and not work.exists()
     return done.stderr.strip().replace(str(run), run.name)
 

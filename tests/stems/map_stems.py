@@ -14,16 +14,14 @@ from collections import defaultdict
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program
+from program import Cases, program, simulated
 from recordings import read_mcap, write_mcap
 
 TIMED = {"run.json", "report.html"}
 
 cases = Cases()
-REC = cases.folder / "lieksa2.mcap"
-TRUTH = cases.folder / "lieksa2.truth"
-done = program("simulate", "lieksa2", "-o", REC, "--seed", 5, "--set", "duration_s=40")
-assert done.returncode == 0, done.stderr
+REC = simulated("lieksa2", 5, 40)
+TRUTH = REC.with_suffix(".truth")
 
 
 def sparse(recording, run, *options):
@@ -245,10 +243,11 @@ def with_imu(folder):
     """Quick turns within scans of 128 rings, without a pause between them. The gyroscope knows them, and
     steps from scan to scan guess them. An error of the guess must not grow."""
     errors = []
+    walk = simulated("handheld", 5, 9)
     for use in ("false", "true"):
-        done = sparse("sim:handheld?seed=5&duration_s=9", folder / use, "--set", f"stems.imu.use={use}")
+        done = sparse(walk, folder / use, "--set", f"stems.imu.use={use}")
         assert done.returncode == 0, done.stderr
-        errors.append(evaluated(folder / use, folder / f"{use}.truth", "--align", "se3"))
+        errors.append(evaluated(folder / use, walk.with_suffix(".truth"), "--align", "se3"))
     plane = [e["ape_plane_rmse_m"] for e in errors]
     turn = [e["ape_rotation_rmse_deg"] for e in errors]
     assert errors[0]["length_m"] > 5 and plane[0] < 0.1, errors[0]

@@ -76,7 +76,7 @@ def other_way(folder):
         assert done.returncode == 3 and f"understory map {recording}" in done.stderr, done
 
 
-GOOD, MESSAGES, TRUTH = good_recording(cases.folder, seconds=6)
+GOOD, MESSAGES, TRUTH = good_recording(seconds=6)
 
 
 @cases.case("sensors that the extrinsics put tens of metres apart")

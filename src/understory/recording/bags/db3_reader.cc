@@ -188,7 +188,9 @@ class Db3Source : public MessageSource {
     if (rows == nullptr) fail("expected a table of messages: ");
     return rows;
   }
+  // In one transaction: else SQLite locks the file anew for each row that is missing.
   Statement prepare_row_by_row() {
+    sqlite3_exec(database_.get(), "BEGIN", nullptr, nullptr, nullptr);
     return prepare("SELECT id, topic_id, timestamp, data FROM messages WHERE id = ?");
   }
 
