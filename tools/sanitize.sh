@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# sanitize.sh [asan|tsan] [--short] [CTEST ARGUMENTS]: the tests of the layers (not those of tests/, which run
-# the whole program) under a sanitizer; --short: without those of tools/long_tests.txt. Leak checks stay off for the libraries that keep caches of
-# their own until the end (GDAL, TBB).
+# sanitize.sh [asan|tsan] [--short] [CTEST ARGUMENTS]
+# Runs the tests of the layers under a sanitizer, not those of tests/, which run the whole program.
+#   --short   without the tests that tools/long_tests.txt lists
+# Leak checks stay off for the libraries that keep caches of their own until the end (GDAL, TBB).
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 cd "$top"
