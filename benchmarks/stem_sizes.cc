@@ -153,8 +153,7 @@ void fit(const std::string& path) {
     std::printf("%s,%d,%.3f,%.3f,%.5f,%.5f,%.5f,%.6f,%.1f,%d,%.5f,%.4f\n",
                 std::filesystem::path(path).stem().c_str(), kept.sensor, kept.path_m, kept.range_m,
                 kept.true_dbh_m, 2.0 * stem.radius_m, 2.0 * excess, stem.spread_m, stem.arc_deg,
-                stem.returns, last.evidence.scatter_m,
-                beam.signal > 0.0 ? 1.0 / beam.signal : 0.0);
+                stem.returns, last.evidence.scatter_m, beam.signal > 0.0 ? 1.0 / beam.signal : 0.0);
   }
 }
 

@@ -42,8 +42,8 @@ Spread spread_of(const std::vector<Diameter>& diameters) {
     spread.mean = sum / weights;
     double squares = 0.0;
     for (const Diameter& d : diameters)
-      squares += ((d.m - spread.mean) * (d.m - spread.mean) - d.variance) /
-                 (spread.variance + d.variance);
+      squares +=
+          ((d.m - spread.mean) * (d.m - spread.mean) - d.variance) / (spread.variance + d.variance);
     spread.variance = std::max(kLeastSpread * kLeastSpread, squares / weights);
   }
   return spread;
