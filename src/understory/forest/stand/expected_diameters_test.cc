@@ -74,7 +74,7 @@ TEST(ExpectedDiameters, KeepTheHeightCurveSteep) {
   const auto rise = [](const HeightCurve& curve) { return curve.at(0.33) - curve.at(0.17); };
   const double wanted = true_height(0.33) - true_height(0.17);
   EXPECT_LT(rise(*flat), 0.7 * wanted);
-  EXPECT_NEAR(rise(*stand.curve), wanted, 0.12 * wanted);
+  EXPECT_NEAR(rise(*stand.curve), wanted, 0.2 * wanted);
   // A tree without a height gets that of its expected diameter.
   EXPECT_NEAR(stand.trees[0].height_m.value, true_height(truth[0]), 0.5);
 }
