@@ -150,10 +150,10 @@ void fit(const std::string& path) {
     beams.sensor = static_cast<LidarSensor>(kept.sensor);
     const BeamFootprint beam = footprint_at(beams, kept.range_m);
     const double excess = excess_radius_m(beam, stem.radius_m, stem.arc_deg);
-    std::printf("%s,%d,%.3f,%.3f,%.5f,%.5f,%.5f,%.6f,%.1f,%d,%.5f\n",
+    std::printf("%s,%d,%.3f,%.3f,%.5f,%.5f,%.5f,%.6f,%.1f,%d,%.5f,%.4f\n",
                 std::filesystem::path(path).stem().c_str(), kept.sensor, kept.path_m, kept.range_m,
                 kept.true_dbh_m, 2.0 * stem.radius_m, 2.0 * excess, stem.spread_m, stem.arc_deg,
-                stem.returns, last.evidence.scatter_m);
+                stem.returns, last.evidence.scatter_m, beam.signal > 0.0 ? 1.0 / beam.signal : 0.0);
   }
 }
 
@@ -167,7 +167,8 @@ int main(int argc, char** argv) {
     gather(kSensors.at(argv[2]), argv[3], argv[4]);
   } else if (mode == "fit") {
     std::printf(
-        "cloud,sensor,path_m,range_m,true_m,dbh_m,excess_m,spread_m,arc_deg,returns,scatter_m\n");
+        "cloud,sensor,path_m,range_m,true_m,dbh_m,excess_m,spread_m,arc_deg,returns,scatter_m,"
+        "weakness\n");
     for (int i = 2; i < argc; ++i)
       fit(argv[i]);
   } else {

@@ -16,7 +16,7 @@ DISTANCES = [(0, 4), (4, 8), (8, 15), (15, 22), (22, 30)]
 SIZES = [(0.05, 0.10), (0.10, 0.20), (0.20, 9.0)]
 FEWEST = 30
 # As in src/understory/forest/stem_constants.h, namespace beam_footprint; metres.
-CONSTANTS = {"known": [2.8, 0.0042, 0.0035], "wide": [2.6, 0.0049, 0.0043, 0.018], "bare": [6.0, 0.003, 0.024]}
+CONSTANTS = {"known": [2.8, 0.0039, 0.0021, 0.056], "wide": [2.6, 0.0049, 0.0043, 0.018], "bare": [6.0, 0.003, 0.024]}
 
 
 def terms_of(kind, rows):
@@ -26,7 +26,7 @@ def terms_of(kind, rows):
     one_sided = np.maximum(0, 1 - rows["arc_deg"] / 360)
     ones = np.ones(len(rows))
     if kind == "known":
-        return np.stack([spread, ones, tens ** 2], 1)
+        return np.stack([spread, ones, tens ** 2, rows["weakness"]], 1)
     if kind == "wide":
         return np.stack([spread, ones, tens ** 2, one_sided * tens], 1)
     return np.stack([spread, ones, one_sided], 1)

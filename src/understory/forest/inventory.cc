@@ -70,7 +70,7 @@ void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3
     stem.beam = footprint_at(config, range);
     stem.beam_excess_m = excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg);
     stem.radius_m -= stem.beam_excess_m;
-    const double sd = diameter_sd_m(stem.spread_m, stem.arc_deg, range, stem.beam.sd_m > 0.0);
+    const double sd = diameter_sd_m(stem.spread_m, stem.arc_deg, range, stem.beam);
     stem.covariance(2, 2) = 0.25 * sd * sd;
   }
 }

@@ -275,9 +275,11 @@ inline constexpr double kMostShare = 0.4;
 // fit ... [tuned: benchmarks/stem_sizes.py]
 inline constexpr double kKnownSpread = 2.8;
 // ... m at least ... [tuned likewise]
-inline constexpr double kKnownLeastSd = 0.0042;
-// ... and m at 10 m, growing with the square of the range [tuned likewise]
-inline constexpr double kKnownRangeSd = 0.0035;
+inline constexpr double kKnownLeastSd = 0.0039;
+// ... m at 10 m, growing with the square of the range ... [tuned likewise]
+inline constexpr double kKnownRangeSd = 0.0021;
+// ... and m where a whole beam on bark is as strong as the weakest echo [tuned likewise]
+inline constexpr double kKnownWeakSd = 0.056;
 // Of one whose beams are not known: times the spread ... [tuned likewise]
 inline constexpr double kWideSpread = 2.6;
 // ... m at least ... [tuned likewise]

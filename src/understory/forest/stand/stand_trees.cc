@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
+#include "understory/forest/stand/expected_diameters.h"
 #include "understory/forest/stand/volume_function.h"
 #include "understory/forest/stand_constants.h"
 
@@ -105,8 +107,13 @@ void apply_function(TaperSpecies species, StandTree& tree) {
 StandTrees stand_trees(const std::vector<Tree>& trees, const StandTableConfig& config) {
   StandTrees stand;
   stand.species = config.species;
-  stand.curve = fit_height_curve(trees);
-  for (const Tree& tree : trees) {
+  const std::vector<double> expected_m = expected_diameters(trees, config.min_dbh_m);
+  std::vector<Tree> on_curve = trees;
+  for (std::size_t i = 0; i < trees.size(); ++i)
+    on_curve[i].dbh_m = expected_m[i];
+  stand.curve = fit_height_curve(on_curve);
+  for (std::size_t i = 0; i < trees.size(); ++i) {
+    const Tree& tree = trees[i];
     if (!(tree.dbh_m > 0.0) || !std::isfinite(tree.dbh_m)) {
       ++stand.without_diameter;
       continue;
@@ -120,12 +127,12 @@ StandTrees stand_trees(const std::vector<Tree>& trees, const StandTableConfig& c
     // A lower bound is no height, nor is the volume up to it one. The same holds for a height far
     // below those of the trees that are as thick.
     if (!is_lower_bound(tree) && (!stand.curve || !std::isfinite(tree.height_m) ||
-                                  stand.curve->is_likely_height(tree.dbh_m, tree.height_m))) {
+                                  stand.curve->is_likely_height(expected_m[i], tree.height_m))) {
       const bool known = std::isfinite(tree.height_sd_m);
       counted.height_m = {tree.height_m, known ? tree.height_sd_m : kHeightSd};
       counted.volume_m3 = {tree.stem_volume_m3, positive_or_zero(tree.stem_volume_sd_m3)};
     }
-    fill_in_height(stand.curve, tree, counted);
+    fill_in_height(stand.curve, on_curve[i], counted);
     stand.trees.push_back(counted);
   }
   const FormFactor factor = form_factor_of(trees, config.min_dbh_m);

@@ -120,14 +120,15 @@ double excess_width_m(const BeamFootprint& beam, double radius_m) {
   return sum / chance_at(0.0, radius_m, beam) - radius_m;
 }
 
-double diameter_sd_m(double spread_m, double arc_deg, double range_m, bool compensated) {
+double diameter_sd_m(double spread_m, double arc_deg, double range_m, const BeamFootprint& beam) {
   const double one_sided = std::max(0.0, 1.0 - arc_deg / 360.0);
   const double spread = 2.0 * spread_m;
   if (!(range_m > 0.0))
     return std::hypot(kBareSpread * spread, kBareLeastSd, kBareOneSided * one_sided);
   const double tens = 0.1 * range_m;
-  if (compensated)
-    return std::hypot(kKnownSpread * spread, kKnownLeastSd, kKnownRangeSd * tens * tens);
+  if (beam.sd_m > 0.0 && beam.signal > 0.0)
+    return std::hypot(std::hypot(kKnownSpread * spread, kKnownLeastSd, kKnownRangeSd * tens * tens),
+                      kKnownWeakSd / beam.signal);
   return std::hypot(std::hypot(kWideSpread * spread, kWideLeastSd, kWideRangeSd * tens * tens),
                     kWideOneSided * one_sided * tens);
 }

@@ -53,9 +53,10 @@ struct BeamFootprint {
 
 // The standard deviation of a diameter, metres. `spread_m`: that of the radius, as if returns were
 // independent and their places on the surface known. `range_m`: from where the stem was seen on
-// average; 0 where it is not known. `compensated`: whether excess_radius_m was taken away.
+// average; 0 where it is not known. `beam`: those for which excess_radius_m was taken away, or
+// nothing. Weak echoes come from a smaller part of the stem, so its width is less sure.
 [[nodiscard]] double diameter_sd_m(double spread_m, double arc_deg, double range_m,
-                                   bool compensated);
+                                   const BeamFootprint& beam);
 
 // By how much a fit of `arc_deg` of the circumference makes a radius too large for that. The whole
 // excess counts where a stem was seen from one side, nothing where it was seen all around.

@@ -87,15 +87,27 @@ TEST(BeamFootprint, AStemThatWasSeenAllAroundKeepsItsRadius) {
 }
 
 TEST(BeamFootprint, DiametersAreSurerNearByAndWithKnownBeams) {
-  const double near = diameter_sd_m(0.001, 180.0, 5.0, true);
-  const double far = diameter_sd_m(0.001, 180.0, 20.0, true);
-  EXPECT_NEAR(
-      near, std::sqrt(std::pow(2.8 * 0.002, 2) + std::pow(0.0042, 2) + std::pow(0.0035 * 0.25, 2)),
-      1e-9);
+  const BeamConfig os1{LidarSensor::kOs1, 0.0, 0.0, 0.0};
+  const double near = diameter_sd_m(0.001, 180.0, 5.0, footprint_at(os1, 5.0));
+  const double far = diameter_sd_m(0.001, 180.0, 20.0, footprint_at(os1, 20.0));
+  // Of a surface of 10 % half of the echoes return from 45 m, and bark has five times as much.
+  const double weakness = 5.0 * 5.0 / (5.0 * 45.0 * 45.0);
+  EXPECT_NEAR(near,
+              std::sqrt(std::pow(2.8 * 0.002, 2) + std::pow(0.0039, 2) +
+                        std::pow(0.0021 * 0.25, 2) + std::pow(0.056 * weakness, 2)),
+              1e-9);
   EXPECT_LT(near, far);
-  EXPECT_LT(far, diameter_sd_m(0.001, 180.0, 20.0, false));
+  EXPECT_LT(far, diameter_sd_m(0.001, 180.0, 20.0, {}));
   // Not known from where: the part that was not seen stands for the distance.
-  EXPECT_LT(diameter_sd_m(0.001, 360.0, 0.0, false), diameter_sd_m(0.001, 180.0, 0.0, false));
+  EXPECT_LT(diameter_sd_m(0.001, 360.0, 0.0, {}), diameter_sd_m(0.001, 180.0, 0.0, {}));
+}
+
+TEST(BeamFootprint, DiametersAreLessSureWhereEchoesAreWeak) {
+  const BeamFootprint strong{0.015, 50.0};
+  const BeamFootprint weak{0.015, 3.0};
+  EXPECT_NEAR(std::pow(diameter_sd_m(0.001, 180.0, 15.0, weak), 2) -
+                  std::pow(diameter_sd_m(0.001, 180.0, 15.0, strong), 2),
+              std::pow(0.056 / 3.0, 2) - std::pow(0.056 / 50.0, 2), 1e-9);
 }
 
 }  // namespace
