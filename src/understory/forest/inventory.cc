@@ -121,11 +121,38 @@ void find_crowns(const CrownTask& task, TileShelf<std::uint64_t>& cubes, Invento
   }
 }
 
-void judge_density(const StemHarvest& gathered, InventoryResult& result) {
+// Half of the canopy that is higher than a breast is higher than this, metres above the ground; 0
+// where there is none.
+double canopy_height(const Raster& canopy) {
+  std::vector<float> heights;
+  for (const float height : canopy.values) {
+    if (height > kBreastHeight) heights.push_back(height);
+  }
+  if (heights.empty()) return 0.0;
+  const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
+  std::nth_element(heights.begin(), middle, heights.end());
+  return *middle;
+}
+
+// Whether the scanner was below the canopy, at more than half of its places. World frame. A place
+// without ground below does not count as such.
+bool below_canopy(const std::vector<Eigen::Vector3d>& scanner, const InventoryResult& result) {
+  const double canopy_m = canopy_height(result.canopy);
+  std::size_t below = 0;
+  for (const Eigen::Vector3d& place : scanner) {
+    const double ground = result.ground.terrain.interpolate(place.x(), place.y());
+    below += place.z() - ground < canopy_m ? 1 : 0;
+  }
+  return 2 * below > scanner.size();
+}
+
+void judge_density(const StemHarvest& gathered, const std::vector<Eigen::Vector3d>& scanner,
+                   InventoryResult& result) {
   const auto returns = static_cast<double>(gathered.near_breast);
   result.too_sparse = returns < kSparse * std::max(1.0, result.area_m2);
-  result.from_above =
-      result.too_sparse && returns < kFromAboveShare * static_cast<double>(result.points);
+  result.from_above = result.too_sparse &&
+                      returns < kFromAboveShare * static_cast<double>(result.points) &&
+                      !below_canopy(scanner, result);
   if (result.from_above) result.thin = {};  // no stem is looked for there
 }
 
@@ -289,7 +316,7 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
   StemTops tops = look_up(task, config.canopy_cell_m, listed);
   result.canopy = tops.canopy.raster(result.origin.x(), result.origin.y());
   result.area_m2 = area_of(result.canopy);
-  judge_density(gathered, result);
+  judge_density(gathered, scanner.places, result);
   result.seen = seen_of(gathered.seen, scanner.places, config.stand.reach_m, result);
   std::vector<double> heights;
   for (std::size_t i = 0; i < result.stems.size(); ++i)

@@ -356,6 +356,31 @@ TEST(Inventory, AnAirborneCloudSaysThatStemsAreNotSeen) {
   EXPECT_FALSE(result.remarks.empty());
 }
 
+// A short walk sees much of the crowns, and few returns a square metre near breast height.
+TEST(Inventory, AScannerBelowTheCanopyDoesNotSeeItFromAbove) {
+  TestPlot plot(9);
+  plot.add_ground(20.0, 4);
+  Random random(9);
+  for (int i = 0; i < 4000; ++i) {
+    const double x = random.uniform(0, 20);
+    const double y = random.uniform(0, 20);
+    plot.cloud.emplace_back(x, y, plot.ground(x, y) + random.uniform(8, 20));
+  }
+  const auto seen_from = [&](double height_m) {
+    std::vector<Eigen::Vector3d> scanner;
+    for (int i = 0; i < 10; ++i)
+      scanner.emplace_back(5.0 + i, 10.0, plot.ground(5.0 + i, 10.0) + height_m);
+    return take_inventory(blocks_of(plot.cloud), {}, {}, {}, scanner);
+  };
+  const InventoryResult walk = seen_from(1.5);
+  EXPECT_TRUE(walk.too_sparse);
+  EXPECT_FALSE(walk.from_above);
+  EXPECT_TRUE(walk.trees.empty());
+  const InventoryResult flight = seen_from(60.0);
+  EXPECT_TRUE(flight.from_above);
+  EXPECT_FALSE(flight.trees.empty());
+}
+
 TEST(Inventory, AnAirborneCloudHasTreesByTheirCrowns) {
   TestPlot plot(9);
   plot.add_ground(20.0, 4);

@@ -19,6 +19,19 @@ namespace understory::odometry_constants {
 // rad a degree [mathematics]
 inline constexpr double kRadPerDegree = std::numbers::pi / 180.0;
 
+namespace sight_noise {  // odometry/stems/sight_noise.cc
+// Pairs of changes before they tell: chance then leaves 0.05 of the correlation [bound: 1/sqrt(n)]
+inline constexpr double kEnoughPairs = 400.0;
+// Share of what was told that is left after a view: some 50 views count [chosen]
+inline constexpr double kKept = 0.98;
+// Correlation of changes that oppose each other: with less the newest sight counts alone. Real
+// views have 0.02, with half of their stems missing 0.08, with 10 cm of noise 0.35
+// [data/wild_places_v03]
+inline constexpr double kLeastOpposed = 0.1;
+// Share of the newest sight at the least, as errors of the pose go along, too [chosen]
+inline constexpr double kLeastGain = 0.05;
+}  // namespace sight_noise
+
 namespace trust_monitor {  // odometry/dense/trust_monitor.cc
 // rad of one turn that stands out from the noise of matching [chosen]
 inline constexpr double kSmallestTurn = 0.3 * kRadPerDegree;

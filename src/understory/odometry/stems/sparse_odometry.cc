@@ -74,7 +74,8 @@ void describe(ConfigTable& table, SparseOdometryConfig& config) {
   table.add("min_overlap", config.min_overlap, {0.0, 1.0}, "",
             "share of a view's stems that must be found again; with fewer a search follows");
   table.add("map_forgetting", config.map_forgetting, {0.01, 1.0}, "",
-            "share by which a stem of the local map moves to its newest sight");
+            "largest share by which a stem of the local map moves to its newest sight; less where "
+            "sights scatter");
   table.add("map_frames", config.map_frames, {1, 10'000}, "",
             "stems that so many views did not see leave the local map");
   table.add("tilt_gain", config.tilt_gain, {0.0, 1.0}, "",
@@ -143,6 +144,18 @@ SparseOdometry::Match SparseOdometry::match(const Source& source, const Pose& gu
   return match;
 }
 
+// The first sights of a stem count alike, until each new one has the share of the steady state.
+void SparseOdometry::see_again(Landmark& landmark, const Eigen::Vector3d& at) {
+  const Eigen::Vector3d change = at - landmark.last_sight_in_world;
+  if (landmark.sights > 1) sight_noise_.add(change.head<2>(), landmark.last_change.head<2>());
+  landmark.last_change = change;
+  landmark.last_sight_in_world = at;
+  ++landmark.sights;
+  const double share =
+      std::min(config_.map_forgetting, std::max(sight_noise_.gain(), 1.0 / landmark.sights));
+  landmark.point_in_world += share * (at - landmark.point_in_world);
+}
+
 void SparseOdometry::take_up(const Source& source, const Pose& world_from_level) {
   if (config_.target == SparseOdometryConfig::Target::kFrame) landmarks_.clear();
   SparsePoints known;
@@ -159,13 +172,14 @@ void SparseOdometry::take_up(const Source& source, const Pose& world_from_level)
     const auto k = static_cast<std::size_t>(found.index);
     if (found.index >= 0 && taken[k] == 0) {
       taken[k] = 1;
-      landmarks_[k].point_in_world += config_.map_forgetting * (at - landmarks_[k].point_in_world);
+      see_again(landmarks_[k], at);
       landmarks_[k].height_sd_m = height_sd;
       landmarks_[k].last_seen = count_;
     } else if (found.index < 0) {
-      landmarks_.push_back({at, height_sd, count_});
+      landmarks_.push_back({at, height_sd, count_, 1, at, Eigen::Vector3d::Zero()});
     }
   }
+  sight_noise_.end_view();
   std::erase_if(landmarks_, [&](const Landmark& landmark) {
     return count_ - landmark.last_seen > config_.map_frames;
   });
@@ -230,7 +244,11 @@ void SparseOdometry::save(BinaryWriter& writer) const {
     writer.put_doubles(landmark.point_in_world.data(), 3);
     writer.put(landmark.height_sd_m);
     writer.put(landmark.last_seen);
+    writer.put(landmark.sights);
+    writer.put_doubles(landmark.last_sight_in_world.data(), 3);
+    writer.put_doubles(landmark.last_change.data(), 3);
   }
+  sight_noise_.save(writer);
   writer.put(static_cast<std::uint64_t>(last_source_.points.size()));
   for (const Eigen::Vector3d& point : last_source_.points)
     writer.put_doubles(point.data(), 3);
@@ -249,7 +267,11 @@ void SparseOdometry::load(BinaryReader& reader) {
     reader.get_doubles(landmark.point_in_world.data(), 3);
     landmark.height_sd_m = reader.get<double>();
     landmark.last_seen = reader.get<int>();
+    landmark.sights = reader.get<int>();
+    reader.get_doubles(landmark.last_sight_in_world.data(), 3);
+    reader.get_doubles(landmark.last_change.data(), 3);
   }
+  sight_noise_.load(reader);
   last_source_.points.clear();
   for (auto left = reader.get<std::uint64_t>(); left > 0; --left)
     reader.get_doubles(last_source_.points.emplace_back().data(), 3);

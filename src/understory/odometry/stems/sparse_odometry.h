@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
+#include "understory/odometry/stems/sight_noise.h"
 #include "understory/odometry/stems/stem_levelling.h"
 #include "understory/registration/stems/go_icp.h"
 #include "understory/registration/stems/sparse_icp.h"
@@ -30,8 +31,9 @@ struct SparseOdometryConfig {
   GoIcpConfig go_icp = small_box();
   YawVoteConfig search;
   double min_overlap = 0.5;  // below it the guess was wrong: search; if still below: weak
-  // A stem of the local map moves by this share of the difference to where it is seen. Averaging
-  // (small values) did not help on real views, whose errors change slowly from view to view.
+  // A stem of the local map moves by at most this share of the difference to where it is seen.
+  // It moves by less as far as the sights tell that they scatter (SightNoise). On real views a
+  // fixed share below 1 did not help: their errors change slowly from view to view.
   double map_forgetting = 1.0;
   int map_frames = 12;     // stems not seen for longer leave the local map
   double tilt_gain = 0.2;  // share of the tilt from the stems' axes taken over at each view
@@ -94,6 +96,9 @@ class SparseOdometry {
     Eigen::Vector3d point_in_world;
     double height_sd_m = 0.0;  // of the last sight; 0: the view did not say
     int last_seen = 0;
+    int sights = 1;
+    Eigen::Vector3d last_sight_in_world;
+    Eigen::Vector3d last_change = Eigen::Vector3d::Zero();  // of the last sight from the one before
   };
   struct Match {
     SparseIcpResult icp;
@@ -113,9 +118,11 @@ class SparseOdometry {
                            const std::optional<Pose>& expected_step) const;
   [[nodiscard]] Eigen::Vector3d about_up(const StemView& view) const;
   void take_up(const Source& source, const Pose& world_from_level);
+  void see_again(Landmark& landmark, const Eigen::Vector3d& at);
 
   SparseOdometryConfig config_;
   std::vector<Landmark> landmarks_;
+  SightNoise sight_noise_;
   // Of the landmarks, with the origin where the view stood that was taken up last; as long as none
   // is taken up it stays.
   std::shared_ptr<const SparseTarget> target_;
