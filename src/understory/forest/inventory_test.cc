@@ -327,18 +327,51 @@ TEST(Inventory, WideBeamsAreTakenAwayWhereSensorAndPlacesAreKnown) {
   EXPECT_LT(known.dbh_sd_m, seen.dbh_sd_m);
 }
 
-TEST(Inventory, AStemHiddenAroundBreastHeightIsNotMeasured) {
+// What stands before a stem hides its foot. Its diameter is then that of the stem above, with a
+// larger deviation. What is hidden higher up may as well be a crown.
+TEST(Inventory, AStemHiddenAroundBreastHeightIsMeasuredAbove) {
   TestPlot plot(15);
   plot.add_ground(12.0, 40);
   TestPlot::Stem stem{6.0, 6.0, 0.3};
   stem.points = 3000;
   plot.add_stem(stem);
-  EXPECT_EQ(take_inventory(blocks_of(plot.cloud), {}).trees.size(), 1U);
-  std::erase_if(plot.cloud, [&](const Eigen::Vector3d& p) {
-    const double height = p.z() - plot.ground(p.x(), p.y());
-    return height > 0.15 && height < 1.8;
-  });
-  EXPECT_TRUE(take_inventory(blocks_of(plot.cloud), {}).trees.empty());
+  const auto hidden_to = [&](double top_m) {
+    std::vector<Eigen::Vector3d> rest;
+    for (const Eigen::Vector3d& p : plot.cloud) {
+      const double height = p.z() - plot.ground(p.x(), p.y());
+      if (height < 0.15 || height > top_m) rest.push_back(p);
+    }
+    return take_inventory(blocks_of(rest), {}).trees;
+  };
+  const std::vector<Tree> whole = hidden_to(0.15);
+  ASSERT_EQ(whole.size(), 1U);
+  const std::vector<Tree> above = hidden_to(1.8);
+  ASSERT_EQ(above.size(), 1U);
+  EXPECT_NEAR(above[0].dbh_m, 0.3, 2.0 * above[0].dbh_sd_m);
+  EXPECT_NEAR(above[0].dbh_m, 0.3, 0.02);
+  EXPECT_GT(above[0].dbh_sd_m, whole[0].dbh_sd_m);
+  EXPECT_TRUE(hidden_to(2.3).empty());
+}
+
+// Five eighths of a stem are seen, from afar: its diameter is uncertain, and that it stands is not.
+TEST(Inventory, AThinStemSeenInPartIsListed) {
+  for (const int points : {700, 2500}) {
+    for (const std::uint64_t seed : {1, 2}) {
+      TestPlot plot(16);
+      plot.add_ground(12.0, 40);
+      Random random(seed);
+      for (int i = 0; i < points; ++i) {
+        const double x = random.uniform(-0.06, 0.015);
+        const double h = random.uniform(0.4, 4.0);
+        const double y = -std::sqrt(0.0036 - x * x) + random.normal(0.0, 0.01);
+        plot.cloud.emplace_back(6.0 + x + random.normal(0.0, 0.005), 6.0 + y,
+                                plot.ground(6.0, 6.0) + h);
+      }
+      const std::vector<Tree> trees = take_inventory(blocks_of(plot.cloud), {}).trees;
+      ASSERT_EQ(trees.size(), 1U) << points << " " << seed;
+      EXPECT_NEAR(trees[0].dbh_m, 0.12, 0.05);
+    }
+  }
 }
 
 TEST(Inventory, AnAirborneCloudSaysThatStemsAreNotSeen) {

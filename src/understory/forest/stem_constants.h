@@ -51,6 +51,12 @@ inline constexpr double kAloneExtent = 1.5;
 inline constexpr double kAloneSlices = 0.85;
 // degrees of its circle that are seen evenly [tuned on simulated maps]
 inline constexpr double kAloneArcDeg = 90.0;
+// Sum of the ratios of a column that stands clear [chosen]
+inline constexpr double kClearClutter = 0.15;
+// m over breast height: its foot may be hidden so far up [chosen]
+inline constexpr double kClearBeginsAbove = 0.7;
+// Radii: its scatter at most [chosen]
+inline constexpr double kClearScatterShare = 0.25;
 // Share of the slices between its ends that show a stem [tuned on simulated maps]
 inline constexpr double kLeastSliceShare = 0.6;
 // m that a stem extends at least [tuned on simulated maps]

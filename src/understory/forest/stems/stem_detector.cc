@@ -137,6 +137,21 @@ bool stands_alone(const StemFitResult& fit, double slices_between, double lean_d
          e.scatter_m <= kAloneScatterShare * fit.stem.radius_m + kAloneScatter;
 }
 
+// A column with hardly a point beside or inside it, from bottom to top: a stem that was seen from
+// one side, from afar. Its diameter may be uncertain, and what stands before it may hide its foot.
+bool is_clear_column(const StemFitResult& fit, const StemDetectorConfig& config,
+                     double slices_between, double lean_deg) {
+  const StemFit& stem = fit.stem;
+  const StemEvidence& e = fit.evidence;
+  const double sd = std::sqrt(std::max(0.0, stem.covariance(2, 2)));
+  return e.inside_ratio + e.outside_ratio <= kClearClutter && lean_deg <= kAloneLeanDeg &&
+         stem.highest_m - stem.lowest_m >= kAloneExtent &&
+         stem.highest_m > config.highest_m - config.slice_m &&
+         stem.lowest_m <= kBreastHeight + kClearBeginsAbove &&
+         e.slices >= kAloneSlices * slices_between && e.even_arc_deg >= kAloneArcDeg &&
+         e.scatter_m <= kClearScatterShare * stem.radius_m && sd <= kFewSlicesSd * stem.radius_m;
+}
+
 // Is it a stem, or a bush that a cone happens to fit?
 bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig& config) {
   if (!fit.converged) return false;
@@ -154,14 +169,15 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
   if (dbh < config.min_dbh_m || dbh > config.max_dbh_m || lean_deg > config.max_lean_deg ||
       e.returns < wanted_returns || e.slices < config.min_slices ||
       e.slices < kLeastSliceShare * slices_between ||
-      extent < std::max(kLeastExtent, 2.0 * cut.thickness_m) ||
-      stem.lowest_m > kBreastHeight + kBeginsAbove ||  // a branch or a crown, not a stem
-      stem.arc_deg < config.min_arc_deg ||
+      extent < std::max(kLeastExtent, 2.0 * cut.thickness_m) || stem.arc_deg < config.min_arc_deg ||
       e.even_arc_deg <
-          std::max(kEvenArcOfLeast * config.min_arc_deg, kEvenArcShare * stem.arc_deg) ||
-      dbh_sd > kDbhSd + kDbhSdShare * dbh) {
+          std::max(kEvenArcOfLeast * config.min_arc_deg, kEvenArcShare * stem.arc_deg)) {
     return false;
   }
+  if (is_clear_column(fit, config, slices_between, lean_deg)) return true;
+  // What begins higher is a branch or a crown.
+  if (stem.lowest_m > kBreastHeight + kBeginsAbove || dbh_sd > kDbhSd + kDbhSdShare * dbh)
+    return false;
   if (stands_alone(fit, slices_between, lean_deg)) return true;
   // Where points are many, a stem shows in thin slices; what only thick ones show has to be clean.
   const double clutter = e.inside_ratio + e.outside_ratio;

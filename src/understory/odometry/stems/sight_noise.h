@@ -9,8 +9,8 @@ namespace understory {
 // How much of the change of a stem's place from one sight to the next is noise. Noise that is drawn
 // anew at each sight is taken back by the next one, so that changes which follow one another
 // oppose each other. An error that goes along with the place of the body does not do that.
-// The model is a local level with noise, an ARIMA(0,1,1) process [Muth 1960, J. Am. Stat. Assoc. 55].
-// Its changes d have cov(d_k, d_k-1) / var(d) = -t / (1 + t^2). The best estimate of the place
+// The model is a local level with noise, an ARIMA(0,1,1) process [Muth 1960, J. Am. Stat. Assoc.
+// 55]. Its changes d have cov(d_k, d_k-1) / var(d) = -t / (1 + t^2). The best estimate of the place
 // moves by 1 - t of what is new at each sight: the steady gain of a Kalman filter.
 class SightNoise {
  public:

@@ -13,7 +13,9 @@ namespace {
 double gain_of(double noise_m, double walk_m) {
   std::mt19937 random(7);
   std::normal_distribution<double> unit;
-  const auto draw = [&](double sd) { return Eigen::Vector2d(sd * unit(random), sd * unit(random)); };
+  const auto draw = [&](double sd) {
+    return Eigen::Vector2d(sd * unit(random), sd * unit(random));
+  };
   std::vector<Eigen::Vector2d> places(60, Eigen::Vector2d::Zero());
   std::vector<Eigen::Vector2d> sights = places;
   std::vector<Eigen::Vector2d> changes = places;
@@ -49,7 +51,9 @@ TEST(SightNoise, GivesTheGainOfTheFilterThatKnowsTheNoise) {
     EXPECT_NEAR(gain_of(0.1, walk), kalman_gain(0.1, walk), 0.06) << walk;
 }
 
-TEST(SightNoise, WithoutNoiseTheNewestSightCounts) { EXPECT_GT(gain_of(0.001, 0.05), 0.95); }
+TEST(SightNoise, WithoutNoiseTheNewestSightCounts) {
+  EXPECT_GT(gain_of(0.001, 0.05), 0.95);
+}
 
 TEST(SightNoise, TheFirstSightsTellNothing) {
   SightNoise noise;
