@@ -1,4 +1,5 @@
-"""docs/method/papers.md names what is there: each file, test and key of the configuration in it exists."""
+"""docs/method/papers.md names what is there: each file, test and key of the configuration in it exists. A row
+says what is missing where its state says that something is, and only there. A built row names a test."""
 
 import os
 import re
@@ -47,5 +48,16 @@ for name in sorted(named):
             wrong.append(f"no key {name}")
         elif value and not re.search(rf"\b{value}\b", known[fits[0]]) and re.search(r"\|", known[fits[0]]):
             wrong.append(f"{stem} has no value {value}: {known[fits[0]].strip()}")
+
+# What a row calls missing is what its state says.
+rows = re.findall(r"^\| ((?:P\d|B)-\d+) [^|]*\| ([^|]*) \|[^|]*\|([^|]*)\|([^|]*)\|$", page, re.M)
+assert len(rows) == len(re.findall(r"^\| (?:P\d|B)-\d", page, re.M)) == 64, len(rows)
+for row, state, notes, shown_by in rows:
+    if not re.match(r"built\b|part$|not built$", state):
+        wrong.append(f"{row}: no state {state}")
+    if state.startswith("built") == ("*Missing*:" in notes):
+        wrong.append(f"{row}: {state}, but its notes say {'' if '*Missing*:' in notes else 'not '}what is missing")
+    if state.startswith("built") and "`" not in shown_by:
+        wrong.append(f"{row}: built, but no test is named")
 assert not wrong, "\n".join(wrong)
-print(f"{len(named)} names looked up")
+print(f"{len(named)} names looked up in {len(rows)} rows")
