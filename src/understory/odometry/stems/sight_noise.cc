@@ -9,9 +9,9 @@ namespace understory {
 
 using namespace odometry_constants::sight_noise;
 
-void SightNoise::add(const Eigen::Vector2d& change, const Eigen::Vector2d& change_before) {
-  squares_m2_ += 0.5 * (change.squaredNorm() + change_before.squaredNorm());
-  products_m2_ += change.dot(change_before);
+void SightNoise::add(double square_m2, double square_before_m2, double product_m2) {
+  squares_m2_ += 0.5 * (square_m2 + square_before_m2);
+  products_m2_ += product_m2;
   pairs_ += 1.0;
 }
 

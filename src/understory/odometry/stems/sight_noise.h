@@ -1,7 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
-
 #include "understory/util/files/binary_io.h"
 
 namespace understory {
@@ -14,8 +12,9 @@ namespace understory {
 // moves by 1 - t of what is new at each sight: the steady gain of a Kalman filter.
 class SightNoise {
  public:
-  // One stem: its change at this sight and at the sight before, metres, in axes that do not turn.
-  void add(const Eigen::Vector2d& change, const Eigen::Vector2d& change_before);
+  // One stem: squares (m^2) of its change at this sight and at the sight before, and the product of
+  // both changes. In axes that do not turn.
+  void add(double square_m2, double square_before_m2, double product_m2);
   // A view ends: those of long ago count less.
   void end_view();
   // Share of the newest sight, in [kLeastGain, 1]; 1 until enough sights have told.

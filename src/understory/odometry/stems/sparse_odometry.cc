@@ -144,16 +144,21 @@ SparseOdometry::Match SparseOdometry::match(const Source& source, const Pose& gu
   return match;
 }
 
-// The first sights of a stem count alike, until each new one has the share of the steady state.
+// In the plane the first sights of a stem count alike, until each new one has the share of the
+// steady state. Of heights the newest one counts. A foot that was guessed from afar is seen at
+// last, and averages of both bend paths in height.
 void SparseOdometry::see_again(Landmark& landmark, const Eigen::Vector3d& at) {
-  const Eigen::Vector3d change = at - landmark.last_sight_in_world;
-  if (landmark.sights > 1) sight_noise_.add(change.head<2>(), landmark.last_change.head<2>());
+  const Eigen::Vector2d change = at.head<2>() - landmark.last_sight_in_world;
+  if (landmark.sights > 1)
+    sight_noise_.add(change.squaredNorm(), landmark.last_change.squaredNorm(),
+                     change.dot(landmark.last_change));
   landmark.last_change = change;
-  landmark.last_sight_in_world = at;
+  landmark.last_sight_in_world = at.head<2>();
   ++landmark.sights;
-  const double share =
+  const double in_plane =
       std::min(config_.map_forgetting, std::max(sight_noise_.gain(), 1.0 / landmark.sights));
-  landmark.point_in_world += share * (at - landmark.point_in_world);
+  const Eigen::Vector3d shares(in_plane, in_plane, config_.map_forgetting);
+  landmark.point_in_world += shares.cwiseProduct(at - landmark.point_in_world);
 }
 
 void SparseOdometry::take_up(const Source& source, const Pose& world_from_level) {
@@ -176,7 +181,7 @@ void SparseOdometry::take_up(const Source& source, const Pose& world_from_level)
       landmarks_[k].height_sd_m = height_sd;
       landmarks_[k].last_seen = count_;
     } else if (found.index < 0) {
-      landmarks_.push_back({at, height_sd, count_, 1, at, Eigen::Vector3d::Zero()});
+      landmarks_.push_back({at, height_sd, count_, 1, at.head<2>(), Eigen::Vector2d::Zero()});
     }
   }
   sight_noise_.end_view();
@@ -245,8 +250,8 @@ void SparseOdometry::save(BinaryWriter& writer) const {
     writer.put(landmark.height_sd_m);
     writer.put(landmark.last_seen);
     writer.put(landmark.sights);
-    writer.put_doubles(landmark.last_sight_in_world.data(), 3);
-    writer.put_doubles(landmark.last_change.data(), 3);
+    writer.put_doubles(landmark.last_sight_in_world.data(), 2);
+    writer.put_doubles(landmark.last_change.data(), 2);
   }
   sight_noise_.save(writer);
   writer.put(static_cast<std::uint64_t>(last_source_.points.size()));
@@ -268,8 +273,8 @@ void SparseOdometry::load(BinaryReader& reader) {
     landmark.height_sd_m = reader.get<double>();
     landmark.last_seen = reader.get<int>();
     landmark.sights = reader.get<int>();
-    reader.get_doubles(landmark.last_sight_in_world.data(), 3);
-    reader.get_doubles(landmark.last_change.data(), 3);
+    reader.get_doubles(landmark.last_sight_in_world.data(), 2);
+    reader.get_doubles(landmark.last_change.data(), 2);
   }
   sight_noise_.load(reader);
   last_source_.points.clear();

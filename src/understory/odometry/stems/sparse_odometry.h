@@ -97,8 +97,8 @@ class SparseOdometry {
     double height_sd_m = 0.0;  // of the last sight; 0: the view did not say
     int last_seen = 0;
     int sights = 1;
-    Eigen::Vector3d last_sight_in_world;
-    Eigen::Vector3d last_change = Eigen::Vector3d::Zero();  // of the last sight from the one before
+    Eigen::Vector2d last_sight_in_world = Eigen::Vector2d::Zero();
+    Eigen::Vector2d last_change = Eigen::Vector2d::Zero();  // of the last sight from the one before
   };
   struct Match {
     SparseIcpResult icp;

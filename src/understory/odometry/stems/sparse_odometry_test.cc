@@ -140,11 +140,11 @@ TEST(SparseOdometry, FollowsATiltedSensorThroughLargeTurns) {
   }
 }
 
-// With the newest sights alone the heading walks away by a hundredth of a radian every few metres.
+// 0.26 m off after 120 m; with the newest sights alone 0.51 m.
 TEST(SparseOdometry, StemsThatScatterAreAveraged) {
   const Stand stand = make_stand(10);
   double squares = 0.0;
-  for (unsigned seed = 1; seed <= 4; ++seed) {
+  for (unsigned seed = 1; seed <= 16; ++seed) {
     std::mt19937 random(seed);
     SparseOdometry odometry({});
     Pose found;
@@ -155,7 +155,7 @@ TEST(SparseOdometry, StemsThatScatterAreAveraged) {
                   .world_from_body;
     squares += (found.translation().head<2>() - Eigen::Vector2d(120.0, 0.0)).squaredNorm();
   }
-  EXPECT_LT(std::sqrt(squares / 4.0), 1.0);
+  EXPECT_LT(std::sqrt(squares / 16.0), 0.38);
 }
 
 TEST(SparseOdometry, AnEmptyViewIsUnmatchedAndKeepsThePose) {
