@@ -51,9 +51,9 @@ inline constexpr double kAloneExtent = 1.5;
 inline constexpr double kAloneSlices = 0.85;
 // degrees of its circle that are seen evenly [tuned on simulated maps]
 inline constexpr double kAloneArcDeg = 90.0;
-// Sum of the ratios of a column that stands clear [chosen]
+// Sum of the ratios of a column that stands clear [tuned on `random` 13, docs/method/forest.md]
 inline constexpr double kClearClutter = 0.15;
-// m over breast height: its foot may be hidden so far up [chosen]
+// m over breast height: its foot may be hidden so far up [tuned on `random` 13]
 inline constexpr double kClearBeginsAbove = 0.7;
 // Radii: its scatter at most [chosen]
 inline constexpr double kClearScatterShare = 0.25;

@@ -24,7 +24,8 @@ void SightNoise::end_view() {
 double SightNoise::gain() const {
   if (pairs_ < kEnoughPairs || squares_m2_ <= 0.0) return 1.0;
   const double opposed = std::clamp(-products_m2_ / squares_m2_, 0.0, 0.5);
-  if (opposed < kLeastOpposed) return 1.0;
+  if (opposed < kLeastOpposed || opposed * squares_m2_ < least_noise_m_ * least_noise_m_ * pairs_)
+    return 1.0;
   const double t = (1.0 - std::sqrt(1.0 - 4.0 * opposed * opposed)) / (2.0 * opposed);
   return std::clamp(1.0 - t, kLeastGain, 1.0);
 }

@@ -12,6 +12,8 @@ namespace understory {
 // moves by 1 - t of what is new at each sight: the steady gain of a Kalman filter.
 class SightNoise {
  public:
+  // `least_noise_m`: with a smaller standard deviation of the noise the newest sight counts alone.
+  explicit SightNoise(double least_noise_m) : least_noise_m_(least_noise_m) {}
   // One stem: squares (m^2) of its change at this sight and at the sight before, and the product of
   // both changes. In axes that do not turn.
   void add(double square_m2, double square_before_m2, double product_m2);
@@ -24,6 +26,7 @@ class SightNoise {
   void load(BinaryReader& reader);
 
  private:
+  double least_noise_m_;
   double squares_m2_ = 0.0;
   double products_m2_ = 0.0;
   double pairs_ = 0.0;

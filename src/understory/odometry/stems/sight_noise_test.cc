@@ -11,7 +11,7 @@ namespace understory {
 namespace {
 
 // The gain after 100 views of 60 stems whose places walk at random and are seen with noise.
-double gain_of(double noise_m, double walk_m) {
+double gain_of(double noise_m, double walk_m, double least_noise_m = 0.0) {
   std::mt19937 random(7);
   std::normal_distribution<double> unit;
   const auto draw = [&](double sd) {
@@ -20,7 +20,7 @@ double gain_of(double noise_m, double walk_m) {
   std::vector<Eigen::Vector2d> places(60, Eigen::Vector2d::Zero());
   std::vector<Eigen::Vector2d> sights = places;
   std::vector<Eigen::Vector2d> changes = places;
-  SightNoise noise;
+  SightNoise noise(least_noise_m);
   for (int view = 0; view < 100; ++view) {
     for (std::size_t i = 0; i < places.size(); ++i) {
       places[i] += draw(walk_m);
@@ -58,8 +58,13 @@ TEST(SightNoise, WithLittleNoiseTheNewestSightCounts) {
   EXPECT_EQ(gain_of(0.1, 0.2), 1.0);
 }
 
+TEST(SightNoise, NoiseBelowTheLimitIsNotAveraged) {
+  EXPECT_EQ(gain_of(0.05, 0.02, 0.15), 1.0);
+  EXPECT_LT(gain_of(0.3, 0.02, 0.15), 0.3);
+}
+
 TEST(SightNoise, TheFirstSightsTellNothing) {
-  SightNoise noise;
+  SightNoise noise(0.0);
   for (int k = 0; k < 20; ++k)
     noise.add(0.01, 0.01, -0.01);
   EXPECT_EQ(noise.gain(), 1.0);

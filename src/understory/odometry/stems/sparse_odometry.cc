@@ -144,20 +144,25 @@ SparseOdometry::Match SparseOdometry::match(const Source& source, const Pose& gu
   return match;
 }
 
-// In the plane the first sights of a stem count alike, until each new one has the share of the
-// steady state. Of heights the newest one counts. A foot that was guessed from afar is seen at
-// last, and averages of both bend paths in height.
+// The first sights of a stem count alike, until each new one has the share of the steady state.
+// Heights have a share of their own, and the newest one counts unless they are very noisy.
+// A foot that was guessed from afar is seen at last, and averages of both bend paths in height.
 void SparseOdometry::see_again(Landmark& landmark, const Eigen::Vector3d& at) {
-  const Eigen::Vector2d change = at.head<2>() - landmark.last_sight_in_world;
-  if (landmark.sights > 1)
-    sight_noise_.add(change.squaredNorm(), landmark.last_change.squaredNorm(),
-                     change.dot(landmark.last_change));
+  const Eigen::Vector3d change = at - landmark.last_sight_in_world;
+  const Eigen::Vector3d& before = landmark.last_change;
+  if (landmark.sights > 1) {
+    plane_noise_.add(change.head<2>().squaredNorm(), before.head<2>().squaredNorm(),
+                     change.head<2>().dot(before.head<2>()));
+    height_noise_.add(change.z() * change.z(), before.z() * before.z(), change.z() * before.z());
+  }
   landmark.last_change = change;
-  landmark.last_sight_in_world = at.head<2>();
+  landmark.last_sight_in_world = at;
   ++landmark.sights;
-  const double in_plane =
-      std::min(config_.map_forgetting, std::max(sight_noise_.gain(), 1.0 / landmark.sights));
-  const Eigen::Vector3d shares(in_plane, in_plane, config_.map_forgetting);
+  const auto share = [&](const SightNoise& noise) {
+    return std::min(config_.map_forgetting, std::max(noise.gain(), 1.0 / landmark.sights));
+  };
+  const double in_plane = share(plane_noise_);
+  const Eigen::Vector3d shares(in_plane, in_plane, share(height_noise_));
   landmark.point_in_world += shares.cwiseProduct(at - landmark.point_in_world);
 }
 
@@ -181,10 +186,11 @@ void SparseOdometry::take_up(const Source& source, const Pose& world_from_level)
       landmarks_[k].height_sd_m = height_sd;
       landmarks_[k].last_seen = count_;
     } else if (found.index < 0) {
-      landmarks_.push_back({at, height_sd, count_, 1, at.head<2>(), Eigen::Vector2d::Zero()});
+      landmarks_.push_back({at, height_sd, count_, 1, at, Eigen::Vector3d::Zero()});
     }
   }
-  sight_noise_.end_view();
+  plane_noise_.end_view();
+  height_noise_.end_view();
   std::erase_if(landmarks_, [&](const Landmark& landmark) {
     return count_ - landmark.last_seen > config_.map_frames;
   });
@@ -250,10 +256,11 @@ void SparseOdometry::save(BinaryWriter& writer) const {
     writer.put(landmark.height_sd_m);
     writer.put(landmark.last_seen);
     writer.put(landmark.sights);
-    writer.put_doubles(landmark.last_sight_in_world.data(), 2);
-    writer.put_doubles(landmark.last_change.data(), 2);
+    writer.put_doubles(landmark.last_sight_in_world.data(), 3);
+    writer.put_doubles(landmark.last_change.data(), 3);
   }
-  sight_noise_.save(writer);
+  plane_noise_.save(writer);
+  height_noise_.save(writer);
   writer.put(static_cast<std::uint64_t>(last_source_.points.size()));
   for (const Eigen::Vector3d& point : last_source_.points)
     writer.put_doubles(point.data(), 3);
@@ -273,10 +280,11 @@ void SparseOdometry::load(BinaryReader& reader) {
     landmark.height_sd_m = reader.get<double>();
     landmark.last_seen = reader.get<int>();
     landmark.sights = reader.get<int>();
-    reader.get_doubles(landmark.last_sight_in_world.data(), 2);
-    reader.get_doubles(landmark.last_change.data(), 2);
+    reader.get_doubles(landmark.last_sight_in_world.data(), 3);
+    reader.get_doubles(landmark.last_change.data(), 3);
   }
-  sight_noise_.load(reader);
+  plane_noise_.load(reader);
+  height_noise_.load(reader);
   last_source_.points.clear();
   for (auto left = reader.get<std::uint64_t>(); left > 0; --left)
     reader.get_doubles(last_source_.points.emplace_back().data(), 3);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "understory/geometry/pose.h"
+#include "understory/odometry/odometry_constants.h"
 #include "understory/odometry/stems/sight_noise.h"
 #include "understory/odometry/stems/stem_levelling.h"
 #include "understory/registration/stems/go_icp.h"
@@ -97,8 +98,8 @@ class SparseOdometry {
     double height_sd_m = 0.0;  // of the last sight; 0: the view did not say
     int last_seen = 0;
     int sights = 1;
-    Eigen::Vector2d last_sight_in_world = Eigen::Vector2d::Zero();
-    Eigen::Vector2d last_change = Eigen::Vector2d::Zero();  // of the last sight from the one before
+    Eigen::Vector3d last_sight_in_world = Eigen::Vector3d::Zero();
+    Eigen::Vector3d last_change = Eigen::Vector3d::Zero();  // of the last sight from the one before
   };
   struct Match {
     SparseIcpResult icp;
@@ -122,7 +123,8 @@ class SparseOdometry {
 
   SparseOdometryConfig config_;
   std::vector<Landmark> landmarks_;
-  SightNoise sight_noise_;
+  SightNoise plane_noise_{odometry_constants::sight_noise::kLeastNoiseInPlaneM};
+  SightNoise height_noise_{odometry_constants::sight_noise::kLeastNoiseInHeightM};
   // Of the landmarks, with the origin where the view stood that was taken up last; as long as none
   // is taken up it stays.
   std::shared_ptr<const SparseTarget> target_;
