@@ -7,7 +7,7 @@
 namespace understory::forest_constants {
 
 namespace stand_errors {  // forest/stand/stand_figures.cc
-// m: standard deviation of the error that all heights share; without it the mean height of a plot
+// m: standard deviation of the error that all heights share. Without it the mean height of a plot
 // would seem too certain [tuned: seeds 3 and 4 of the site handheld, 0.3 m too high]
 inline constexpr double kSharedHeightSd = 0.3;
 // Standard deviation of the error of a stand's height curve beyond its fit, as a share of the

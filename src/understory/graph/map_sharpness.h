@@ -40,8 +40,8 @@ struct SharpnessConfig {
 // Tree registration noise, P0 section 2.5 and (33): distances of sights from the mean of their
 // cluster, seen from above. The paper's e_C is over all clusters. A cluster is several trees side
 // by side where a view in five or more has two sights of it. Their sights have run together and the
-// width is no noise, so ours leaves it out. (On a simulated site one such pair among 596 trees took
-// e_C from 4.9 to 7.4 cm.)
+// width is no noise, so ours leaves it out. On a simulated site one such pair among 596 trees took
+// e_C from 4.9 to 7.4 cm.
 struct RegistrationNoise {
   // e_C by (33), as the paper has it: root mean square over the sights of all clusters, metres. NaN
   // without a cluster.

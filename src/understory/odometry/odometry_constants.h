@@ -29,11 +29,10 @@ inline constexpr double kKept = 0.98;
 // with it. Real views have 0.02, with half of their stems missing 0.08, with 10 cm of noise 0.35 in
 // the mean [data/wild_places_v03: with 0.1 the undisturbed path is 0.03 m worse in the plane]
 inline constexpr double kLeastOpposed = 0.25;
-// m of noise in the plane from which sights are averaged [chosen: any]
+// m of noise in the plane from which sights are averaged: any [chosen]
 inline constexpr double kLeastNoiseInPlaneM = 0.0;
-// m of noise of heights from which they are averaged. Guesses of feet err by 9 cm in a way that
-// goes along with the distance, and averages of them bend paths in height [tuned on simulated
-// roads]
+// m of noise of heights from which they are averaged. Guessed feet err by 9 cm, and the error goes
+// along with the distance. Averages of them bend a path in height [tuned on simulated roads]
 inline constexpr double kLeastNoiseInHeightM = 0.15;
 // Share of the newest sight at the least, as errors of the pose go along, too [chosen]
 inline constexpr double kLeastGain = 0.05;

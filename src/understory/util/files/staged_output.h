@@ -11,8 +11,8 @@
 namespace understory {
 
 // A file that another part of the program writes from front to back under a name of its own. It
-// appears whole or not at all. `part` is where to write it, `commit` syncs it to the disk and
-// renames it, the destructor drops it otherwise. One process at a time writes it. Not thread-safe.
+// appears whole or not at all. It is written to `part`. `commit` syncs it to the disk and renames
+// it. The destructor drops it otherwise. One process at a time writes it. Not thread-safe.
 class StagedFile {
  public:
   // Refuses as `place_of_file` does. Throws OutputError.
