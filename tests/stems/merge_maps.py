@@ -5,6 +5,7 @@ import csv
 import json
 import math
 import random
+import re
 import sys
 from pathlib import Path
 
@@ -68,6 +69,43 @@ def merged(folder):
     assert again.returncode == 0, again.stderr
     for name in ("trees.csv", "deformation.csv"):
         assert (folder / "both" / name).read_bytes() == (folder / "again" / name).read_bytes()
+
+
+def drawn(report, colour):
+    """Points of the line of that colour in the picture of arrows."""
+    section = report.split("How far the two maps are apart")[1].split("</section>")[0]
+    way = re.search(rf'd="([^"]*)" fill="none" stroke="var\(--{colour}\)"', section)
+    return way and [tuple(map(float, point.split())) for point in re.split("[ML]", way[1])[1:]]
+
+
+@cases.case("the report draws how one map is bent onto the other, and the paths with it")
+def pictured(folder):
+    trees = stand()
+    a = write(folder / "a" / "trees.csv", trees).parent
+    b = write(folder / "b" / "trees.csv", turned(bent(trees))).parent
+    way = [(2.0 * k, 40.0) for k in range(40)]
+    for map_folder, path in ((a, way), (b, turned(bent(way)))):
+        (map_folder / "trajectory.tum").write_text(
+            "".join(f"{k}.0 {x} {y} 0 0 0 0 1\n" for k, (x, y) in enumerate(path)))
+    done = program("merge", a, b, "--align", "-o", folder / "both")
+    # No run.json beside the trees: 4, since nothing tells whether the maps can be trusted.
+    assert done.returncode == 4, done.stderr
+    report = (folder / "both" / "report.html").read_text()
+    first, second, moved = (drawn(report, colour) for colour in ("text", "bad", "good"))
+    assert first and len(first) == len(second) == len(moved) == 40, report[:200]
+    before = max(math.dist(p, q) for p, q in zip(first, second))
+    after = max(math.dist(p, q) for p, q in zip(first[3:-3], moved[3:-3]))
+    assert after < 0.4 * before, (before, after)
+    arrows = report.split('class="field" d="')[1].split('"')[0]
+    assert arrows.count("M") == 2 * len(trees), arrows.count("M")
+    done = program("merge", write(folder / "a.csv", trees), b, "--align", "-o", folder / "alone")
+    assert done.returncode == 4, done.stderr
+    report = (folder / "alone" / "report.html").read_text()
+    assert drawn(report, "text") is None and "Path of the first map" not in report
+    (b / "trajectory.tum").write_text("1.0 2 3\n")
+    done = program("merge", a, b, "--align", "-o", folder / "cut")
+    assert done.returncode == 3 and "trajectory.tum" in done.stderr, done
+    assert not (folder / "cut" / "trees.csv").exists()
 
 
 @cases.case("the best weight is that of the map which a reference agrees with")

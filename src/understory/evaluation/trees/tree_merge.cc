@@ -9,6 +9,10 @@
 namespace understory {
 namespace {
 
+// About two spacings of stems: the field between trees is theirs, without steps.
+constexpr double kFieldSdM = 4.0;
+constexpr double kLeastFieldWeight = 1e-2;  // that of a tree 12 m away
+
 Eigen::Vector2d place(const Tree& tree) {
   return {tree.x, tree.y};
 }
@@ -106,6 +110,31 @@ DeformationField deformation_field(const std::vector<Tree>& from, const std::vec
     field.smoothed.push_back(known.weight[i] > 0.0 ? Eigen::Vector2d(known.sum[i] / known.weight[i])
                                                    : Eigen::Vector2d::Zero().eval());
   return field;
+}
+
+std::vector<Eigen::Vector2d> field_at(const std::vector<Tree>& from, const DeformationField& field,
+                                      const std::vector<Eigen::Vector2d>& places) {
+  SparsePoints points;
+  for (const Tree& tree : from)
+    points.emplace_back(tree.x, tree.y, 0.0);
+  std::vector<Eigen::Vector2d> vectors(places.size(), Eigen::Vector2d::Zero());
+  if (points.empty()) return vectors;
+  const PlaneGrid grid(points);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    double weights = 0.0;
+    grid.around({places[i].x(), places[i].y(), 0.0}, 3.0 * kFieldSdM, [&](std::size_t k) {
+      const double squared = (points[k].head<2>() - places[i]).squaredNorm();
+      const double weight = std::exp(-0.5 * squared / (kFieldSdM * kFieldSdM));
+      vectors[i] += weight * field.smoothed[k];
+      weights += weight;
+    });
+    if (weights >= kLeastFieldWeight) {
+      vectors[i] /= weights;
+    } else {
+      vectors[i].setZero();
+    }
+  }
+  return vectors;
 }
 
 MergedTrees merge_trees(const std::vector<Tree>& s, const std::vector<Tree>& l, double w,

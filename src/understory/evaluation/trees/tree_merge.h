@@ -30,6 +30,14 @@ struct DeformationField {
                                                  const std::vector<Tree>& to,
                                                  const TreeMergeConfig& config);
 
+// The same field at other places of the plane, such as those of the path, P1 figure 7. It is the
+// mean of the smoothed vectors of the trees near, by a Gaussian of their distance. Zero where none
+// is near.
+//   from: the trees of `field`; places: in the frame of the trees, metres
+[[nodiscard]] std::vector<Eigen::Vector2d> field_at(const std::vector<Tree>& from,
+                                                    const DeformationField& field,
+                                                    const std::vector<Eigen::Vector2d>& places);
+
 // Q(w) of P1 (9): S is moved by w of its field towards L, and L by 1 - w of its own towards S. Of
 // pairs nearer than `duplicate_m`, the nearest first, one tree stays. It stands half way between,
 // with what the surer of both knows. Q(0) holds S where it is, Q(1) L. Numbered anew, S first.

@@ -63,6 +63,30 @@ TEST(TreeMerge, AConstantFieldIsPreservedThoughTreesAreMissing) {
     EXPECT_LT((v - Eigen::Vector2d(0.3, -0.4)).norm(), 1e-9);
 }
 
+TEST(TreeMerge, TheFieldOfAPathIsThatOfTheTreesBesideIt) {
+  const std::vector<Tree> s = stand(1, 200);
+  const DeformationField field = deformation_field(s, bent(s, 3, 0.0, 0.0), {});
+  std::vector<Eigen::Vector2d> path;
+  for (int k = 0; k < 20; ++k)
+    path.emplace_back(s[0].x + 0.5 * k, s[0].y);
+  path.emplace_back(s[0].x + 1e4, s[0].y);  // nothing is near
+  const std::vector<Eigen::Vector2d> along = field_at(s, field, path);
+  for (std::size_t k = 0; k < 20; ++k) {
+    double nearest_m = 1e9;
+    Eigen::Vector2d of_nearest = Eigen::Vector2d::Zero();
+    for (std::size_t i = 0; i < s.size(); ++i) {
+      const double away_m = (Eigen::Vector2d(s[i].x, s[i].y) - path[k]).norm();
+      if (away_m < nearest_m) {
+        nearest_m = away_m;
+        of_nearest = field.smoothed[i];
+      }
+    }
+    EXPECT_LT((along[k] - of_nearest).norm(), 0.15) << "at " << k;
+    EXPECT_GT(along[k].norm(), 0.05);
+  }
+  EXPECT_EQ(along.back().norm(), 0.0);
+}
+
 // Against ((I + D^-1 A) / 2)^(2k) as matrices.
 TEST(TreeMerge, SmoothsAsTheMatrixOfTheEquationDoes) {
   const std::vector<Tree> s = stand(2, 60);

@@ -83,6 +83,8 @@ void describe(ConfigTable& table, SelfCorrectionConfig& config) {
               "method lattice: largest number of views between the two of a pair");
     table.add("largest_outlier_ratio", config.lattice.largest_outlier_ratio, {0.0, 1.0}, "",
               "largest outlier ratio of a match; larger ones are refused");
+    table.add("largest_error_m", config.lattice.largest_error_m, {0.0, 1e6}, "m",
+              "largest distance (RMS) of the matched stems; 0: no limit");
   });
   table.section("gain", [&] { describe_gain(table, config.gain); });
   table.section("icp", [&] { describe(table, config.icp); });

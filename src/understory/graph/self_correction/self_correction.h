@@ -35,6 +35,7 @@ struct LatticeConfig {
   int spacing = 30;
   int longest_gap = 300;
   double largest_outlier_ratio = 0.6;  // as in the text of P1; 0.4 in its figure 5
+  double largest_error_m = 0.0;        // of the matched stems; 0.5 m in figure 5. 0: no limit
 };
 
 // The choice of pairs by expected information. L0 is the mean distance between neighbouring stems.

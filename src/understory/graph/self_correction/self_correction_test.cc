@@ -304,6 +304,30 @@ TEST(PairMatching, FindsAPairWhoseGuessIsOffAndRefusesOneOfStrangers) {
   EXPECT_FALSE(stranger.reason.empty());
 }
 
+TEST(PairMatching, TheLatticeHasItsLimitsOfOutliersAndOfTheError) {
+  const Drive seen = drive(9);
+  const ConeOverlap overlap(estimate_view_cone(seen.problem.views));
+  const SparseTarget target(seen.problem.views[40]);
+  const SparsePoints& source = seen.problem.views[46];
+  Vector6d off;
+  off << 0.0, 0.0, 0.1, 1.0, -0.7, 0.0;
+  const Pose guess = seen.truth[40].inverse() * seen.truth[46] * Pose::exp(off);
+  SelfCorrectionConfig config;
+  const PairMatch found = match_lattice_pair(target, source, guess, overlap, config);
+  ASSERT_TRUE(found.accepted) << found.reason;
+  config.lattice.largest_error_m = 1.01 * found.error_m;
+  EXPECT_TRUE(match_lattice_pair(target, source, guess, overlap, config).accepted);
+  config.lattice.largest_error_m = 0.99 * found.error_m;
+  const PairMatch far = match_lattice_pair(target, source, guess, overlap, config);
+  EXPECT_FALSE(far.accepted);
+  EXPECT_EQ(far.reason, "the matched stems lie too far apart");
+  config.lattice = {};
+  config.lattice.largest_outlier_ratio = 0.99 * found.outlier_ratio;
+  const PairMatch few = match_lattice_pair(target, source, guess, overlap, config);
+  EXPECT_FALSE(few.accepted);
+  EXPECT_EQ(few.reason, "too many outliers");
+}
+
 TEST(PairMatching, GatheredViewsSeeMoreAndSharper) {
   const Drive seen = drive(10);
   const SparsePoints gathered = gather_views(seen.problem.views, seen.truth, 60, {3.0, 12, 0.4});

@@ -109,8 +109,13 @@ PairMatch match_lattice_pair(const SparseTarget& target, const SparsePoints& sou
   match.error_m = placed_error(target, source, match.j_from_i, overlap, config.pairs.outlier_ratio);
   match.overlap = found.overlap;
   match.outlier_ratio = 1.0 - found.overlap;
+  const double limit_m = config.lattice.largest_error_m;
   match.accepted = match.outlier_ratio < config.lattice.largest_outlier_ratio;
   if (!match.accepted) match.reason = "too many outliers";
+  if (match.accepted && limit_m > 0.0 && match.error_m > limit_m) {
+    match.accepted = false;
+    match.reason = "the matched stems lie too far apart";
+  }
   require_better(match);
   return match;
 }

@@ -101,6 +101,19 @@ struct ReportCorrection {
   std::vector<double> trees_per_ha;  // in rings about the way
 };
 
+// How one map of trees leads to another (P1 figure 7), world frame of the first.
+struct ReportDeformation {
+  struct Arrow {
+    Eigen::Vector2d at = Eigen::Vector2d::Zero();  // a tree of the second map
+    Eigen::Vector2d by = Eigen::Vector2d::Zero();  // towards the first one, smoothed, metres
+  };
+  std::vector<Arrow> arrows;
+  std::vector<Eigen::Vector2d> path_of_first;  // empty: not known
+  std::vector<Eigen::Vector2d> path_of_second;
+  std::vector<Eigen::Vector2d> moved_path_of_second;  // by the field
+  double mean_m = 0.0;  // distance of the trees that both maps hold, before they were moved
+};
+
 // All that the report shows. What is empty is left out of the page.
 struct ReportInput {
   std::string title;      // name of the recording or cloud
@@ -120,6 +133,7 @@ struct ReportInput {
   std::size_t loops_not_listed = 0;  // views that look like an earlier place, and matching refuted
   bool loop_closure_enabled = true;
   std::optional<ReportCorrection> correction;
+  std::optional<ReportDeformation> deformation;
   std::optional<ReportTruth> truth;
   std::vector<std::string> remarks;           // what to distrust in results of this kind
   WorldFrame world_frame = WorldFrame::kEnu;  // the axes of the lists of trees, as in the files

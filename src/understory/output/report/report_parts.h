@@ -34,6 +34,8 @@ namespace understory {
 [[nodiscard]] std::string correction_section(const ReportInput& input);
 // Its figures: pairs of views, sights before and after, trees over the distance from the way.
 [[nodiscard]] std::string correction_figures(const ReportCorrection& correction);
+// Arrows from one map of trees to the other.
+[[nodiscard]] std::string deformation_section(const ReportInput& input);
 [[nodiscard]] std::string truth_section(const ReportInput& input);
 // Place and clock of the IMU, where they were refined.
 [[nodiscard]] std::string imu_section(const ReportInput& input);

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "understory/evaluation/trajectory.h"
 #include "understory/evaluation/trees/tree_errors.h"
 #include "understory/evaluation/trees/tree_falls.h"
 #include "understory/evaluation/trees/tree_list_check.h"
@@ -28,6 +29,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kTrees = "trees.csv";
 constexpr const char* kFelled = "felled.csv";
+constexpr const char* kTrajectory = "trajectory.tum";
 
 // By steps of 0.05 (P1 found the best weight at -0.15).
 BestWeight best_weight(const std::vector<Tree>& a, const std::vector<Tree>& b,
@@ -55,15 +57,29 @@ void write_field(const fs::path& path, const std::vector<Tree>& b, const Deforma
   file.commit();
 }
 
-// A tree list, laid on the trees of A if that was asked for.
-std::vector<Tree> beside(const std::string& file, const std::vector<Tree>& a,
-                         const MergeRequest& request, const ProgressSink& progress) {
+// A tree list, and the motion that laid it on the trees of A if that was asked for.
+struct Beside {
+  std::vector<Tree> trees;
+  Pose a_from_these;
+};
+Beside beside(const std::string& file, const std::vector<Tree>& a, const MergeRequest& request,
+              const ProgressSink& progress) {
   std::vector<Tree> trees = read_trees(file_in_folder(file, kTrees));
-  if (!request.align) return trees;
+  if (!request.align) return {std::move(trees), {}};
   const auto a_from_these = align_trees(trees, a, Alignment::kYaw, request.merge.reach_m, progress);
   if (!a_from_these)
     throw InputError(file, "", "expected trees of which three lie like trees of " + request.a);
-  return moved(trees, *a_from_these);
+  return {moved(trees, *a_from_these), *a_from_these};
+}
+
+// The path of a map in the plane after a motion; empty where only a tree list is given.
+std::vector<Eigen::Vector2d> path_of(const std::string& map, const Pose& a_from_map) {
+  std::vector<Eigen::Vector2d> path;
+  const fs::path file = fs::path(map) / kTrajectory;
+  if (!fs::exists(file)) return path;
+  for (const StampedPose& pose : read_trajectory(file))
+    path.emplace_back((a_from_map * pose.world_from_body.translation()).head<2>());
+  return path;
 }
 
 // What a map knows of felled trees; nothing where only a tree list is given.
@@ -78,6 +94,8 @@ struct Merge {
   std::vector<Tree> b;  // beside a
   bool same = false;    // a copy of a
   DeformationField field;
+  std::vector<Eigen::Vector2d> path_of_a;
+  std::vector<Eigen::Vector2d> path_of_b;  // beside a
   MergedTrees merged;
   std::vector<TreeFall> falls;
   std::optional<BestWeight> best;
@@ -91,8 +109,12 @@ Merge merge_maps(const MergeRequest& request, const ProgressSink& progress, Stag
     const ScopedTimer timer(times, "reading");
     m.a = read_trees(file_in_folder(request.a, kTrees));
     m.same = are_copies(m.a, read_trees(file_in_folder(request.b, kTrees)));
-    m.b = beside(request.b, m.a, request, progress);
-    if (!request.reference.empty()) reference = beside(request.reference, m.a, request, progress);
+    Beside b = beside(request.b, m.a, request, progress);
+    m.b = std::move(b.trees);
+    m.path_of_a = path_of(request.a, {});
+    m.path_of_b = path_of(request.b, b.a_from_these);
+    if (!request.reference.empty())
+      reference = beside(request.reference, m.a, request, progress).trees;
   }
   const ScopedTimer timer(times, "merging");
   progress.poll();
@@ -175,6 +197,19 @@ void judge(const MergeRequest& request, const Merge& m, RunDocuments& documents)
   documents.inherit(trust_of_run(request.a));
 }
 
+ReportDeformation deformation_of(const Merge& m) {
+  ReportDeformation report;
+  for (std::size_t i = 0; i < m.b.size(); ++i)
+    report.arrows.push_back({{m.b[i].x, m.b[i].y}, m.field.smoothed[i]});
+  report.path_of_first = m.path_of_a;
+  report.path_of_second = report.moved_path_of_second = m.path_of_b;
+  const std::vector<Eigen::Vector2d> by = field_at(m.b, m.field, m.path_of_b);
+  for (std::size_t k = 0; k < by.size(); ++k)
+    report.moved_path_of_second[k] += by[k];
+  report.mean_m = m.field.mean_m;
+  return report;
+}
+
 void describe(const MergeRequest& request, const Merge& m, RunDocuments& documents) {
   add_inputs(request, documents);
   judge(request, m, documents);
@@ -194,6 +229,7 @@ void describe(const MergeRequest& request, const Merge& m, RunDocuments& documen
                                  m.a.size(), m.b.size());
   report.trees = &m.merged.trees;
   report.falls = m.falls;
+  if (m.merged.joined > 0) report.deformation = deformation_of(m);
 }
 
 std::string text_of(const Merge& m) {
