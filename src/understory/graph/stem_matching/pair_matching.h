@@ -25,7 +25,7 @@ struct [[nodiscard]] PairMatch {
 PairMatch match_pair(const SparseTarget& target, const SparsePoints& source, const Pose& j_from_i,
                      const ConeOverlap& overlap, const SelfCorrectionConfig& config);
 
-// P1 section 2.3: Go-ICP at once; accepted if the error has become smaller, and the measured
+// P1 section 2.3: Go-ICP at once. Accepted if the error has become smaller, and the measured
 // outlier ratio and the error are within the limits of LatticeConfig.
 PairMatch match_lattice_pair(const SparseTarget& target, const SparsePoints& source,
                              const Pose& j_from_i, const ConeOverlap& overlap,
