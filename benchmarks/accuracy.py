@@ -55,6 +55,8 @@ ROWS = {
     "harvester_drift": Row("harvester: drift", "%", 0.15, 1.5),
     "scan_mean": Row("whole pipeline per scan, mean", "ms", 45.0, 2.0, decimals=1),
     "scan_p99": Row("whole pipeline per scan, p99", "ms", 90.0, 2.0, decimals=1),
+    # Of a lidar at 10 Hz. Other work of the machine shows here first, so the short form allows for it.
+    "scan_max": Row("whole pipeline per scan, slowest", "ms", 100.0, 10.0, decimals=1),
     # In the short form the first tenth is almost all standing still.
     "constancy": Row("CPU per scan, last tenth / first tenth", "", 1.1, 2.0, decimals=2),
     "constancy_alone": Row("the same without loop closure", "", 1.1, 1.5, decimals=2),
@@ -105,6 +107,7 @@ def add_cost(table, seed, result, short=False):
     scan = result["stages"]["scan"]
     table.add("scan_mean", seed, scan["wall_ms"]["mean"])
     table.add("scan_p99", seed, scan["wall_ms"]["p99"])
+    table.add("scan_max", seed, scan["wall_ms"]["max"])
     table.add("memory", seed, result["process"]["peak_memory_mb"])
     add_constancy(table, "constancy", seed, result)
     if short:  # caches of bounded size are still filling
