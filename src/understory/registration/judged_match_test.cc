@@ -59,6 +59,17 @@ TEST(Conclude, ADirectionWithoutInformationIsNamed) {
   EXPECT_NEAR(std::abs(result.degenerate_directions(4, 0)), 1.0, 1e-9);
 }
 
+TEST(OverallFitness, PointsWithoutAMatchCountAsAtTheReach) {
+  RegistrationResult result;
+  result.fitness_m2 = 0.04;
+  result.inlier_ratio = 0.75;
+  EXPECT_DOUBLE_EQ(overall_fitness_m2(result, 0.5), 0.75 * 0.04 + 0.25 * 0.25);
+  result.inlier_ratio = 1.0;
+  EXPECT_DOUBLE_EQ(overall_fitness_m2(result, 0.5), 0.04);
+  result.inlier_ratio = 0.0;
+  EXPECT_DOUBLE_EQ(overall_fitness_m2(result, 2.0), 4.0);
+}
+
 TEST(Conclude, SaysWhatIsWrong) {
   const RegistrationResult slow = conclude_from(sums(), false);
   EXPECT_EQ(slow.status, RegistrationStatus::kIterationLimit);

@@ -144,6 +144,13 @@ class Matcher {
   [[nodiscard]] virtual bool sums_up_points() const = 0;
 };
 
+// How the error of a method's matches grows with their fitness, P4 (36). Found on simulated
+// recordings, see docs/method/odometry.md.
+struct FitnessNoise {
+  double threshold_m2 = 0.0;  // tau: up to this fitness a match is as good as any
+  double scale = 0.0;         // theta, 1/m^4: growth of the deviation with the square of the excess
+};
+
 // What is known of a recording's scans when the settings of a method are chosen for it.
 struct ScanTraits {
   bool sparse = false;  // a lidar of few rings: few points, and most of them in traces of rings

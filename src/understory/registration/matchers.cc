@@ -65,6 +65,14 @@ std::unique_ptr<const Matcher> make_matcher(const MatcherConfig& config,
   return matcher;
 }
 
+FitnessNoise fitness_noise(const MatcherConfig& config) {
+  FitnessNoise noise;
+  for_each_method(config, [&]<typename Config>(const Config&) {
+    if (config.method == Config::kName) noise = Config::kFitnessNoise;
+  });
+  return noise;
+}
+
 std::vector<SuitedSetting> suited_settings(const MatcherConfig& config, const ScanTraits& traits) {
   std::vector<SuitedSetting> suited;
   for_each_method(config, [&](const auto& each) {

@@ -20,6 +20,7 @@ namespace understory {
 // The methods there are, by their configurations: a new one is a line here. A configuration C is an
 // aggregate with
 //   static constexpr const char* kName, kSummary;                  "ndt", and a few words of help
+//   static constexpr FitnessNoise kFitnessNoise;                   how its errors grow
 //   void describe(ConfigTable&, C&);                               the settings in section kName
 //   std::unique_ptr<const Matcher> make_matcher(const C&);         throws ConfigError
 //   std::vector<SuitedSetting> suited_settings(const C&, const ScanTraits&);
@@ -61,6 +62,9 @@ void describe_settings(ConfigTable& table, MatcherConfig& config);
 [[nodiscard]] std::unique_ptr<const Matcher> make_matcher(const MatcherConfig& config);
 [[nodiscard]] std::unique_ptr<const Matcher> make_matcher(const MatcherConfig& config,
                                                           const std::string& method);
+
+// How the errors of the chosen method grow with the fitness of its matches.
+[[nodiscard]] FitnessNoise fitness_noise(const MatcherConfig& config);
 
 // Settings of the chosen method that suit such scans better than those in `config`; keys begin with
 // the method's section.

@@ -92,6 +92,24 @@ TEST_P(AnyMatcher, FindsAScanInAMapOfKeyframesFromNearAndFromFar) {
   expect_truth(target->match(source_, truth_ * Pose::exp(step(0.05, 2.0)), {}, MatchStart::kFar));
 }
 
+// P4 (36): a scan of which half is nowhere in the map is past tau, and tau is below the reach.
+TEST_P(AnyMatcher, TellsAtWhichFitnessItsErrorsGrow) {
+  const FitnessNoise noise = fitness_noise(config_);
+  const MatchTargetPtr target = path_target();
+  EXPECT_GT(noise.scale, 0.0);
+  EXPECT_GT(noise.threshold_m2, 0.0);
+  EXPECT_LT(noise.threshold_m2, 0.3 * target->reach_m() * target->reach_m());
+  Points half_lost = source_;
+  for (std::size_t i = 0; i < half_lost.size(); i += 2)
+    half_lost[i].z() += 50.0F;
+  const auto overall = [&](const Points& source) {
+    return overall_fitness_m2(target->match(source, truth_, {}, MatchStart::kNear),
+                              target->reach_m());
+  };
+  EXPECT_GT(overall(half_lost), 1.5 * noise.threshold_m2);
+  EXPECT_LT(overall(source_), 0.8 * overall(half_lost));
+}
+
 TEST_P(AnyMatcher, FindsAScanInASingleCloud) {
   const auto matcher = make_matcher(config_);
   const Pose pose = upright(1.0, 0.0, 1.6);

@@ -110,7 +110,8 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& loc
       match_elastically(scan, *local_map, guess, estimate);
     std::optional<LidarFactor> factor;
     if (estimate.matched) {
-      factor = LidarFactor{estimate.match.target_from_source, estimate.match.fitness_m2,
+      factor = LidarFactor{estimate.match.target_from_source,
+                           overall_fitness_m2(estimate.match, local_map->reach_m()),
                            estimate.match.information};
     }
     if (local_map && known.pose) {
@@ -226,7 +227,8 @@ PartEstimate DenseOdometry::match_part(const Scan& part, const MatchTarget& loca
   estimate.matched = match.usable() && match.inlier_ratio >= least;
   estimate.world_from_body = predicted.world_from_body;
   if (!estimate.matched) return estimate;
-  const LidarFactor factor{match.target_from_source, match.fitness_m2, match.information};
+  const LidarFactor factor{match.target_from_source,
+                           overall_fitness_m2(match, local_map.reach_m()), match.information};
   estimate.world_from_body =
       fuse(predicted, factor.world_from_body, lidar_covariance(factor, config_.motion.lidar));
   return estimate;

@@ -224,6 +224,32 @@ TEST_F(LookingAround, FewPointsCountIfTheyLieOnTheMapsSurfaces) {
   EXPECT_FALSE(last_of(1.5, scattered(mostly_new)).matched);
 }
 
+// P4 (36): what matches nothing makes the fitness worse, and the pose less sure.
+TEST_F(LookingAround, AScanThatIsMostlyNewIsLessSure) {
+  const auto variance_after = [&](const Scan& last, double threshold_m2) {
+    StageTimes times;
+    Log log;
+    DenseOdometryConfig config;
+    config.match.few_found_residual = 1.5;
+    config.motion.lidar.source = LidarNoise::kFitness;
+    config.motion.lidar.fitness_threshold_m2 = threshold_m2;
+    config.motion.lidar.fitness_scale = 1000.0;
+    DenseOdometry odometry(config, Rig(), nullptr, times, log);
+    odometry.set_initial_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+    const MatchTargetPtr local_map = map();
+    for (int i = 0; i < 3; ++i)
+      EXPECT_TRUE(odometry.process(scan(kPeriod * i), local_map).matched);
+    const DenseEstimate estimate = odometry.process(last, local_map);
+    EXPECT_TRUE(estimate.matched);
+    return estimate.state.pose_covariance.diagonal().tail<3>().sum();
+  };
+  const Scan seen = scan(kPeriod * 3);
+  const Scan mostly_new = with_another_lidar(seen, 0);
+  EXPECT_GT(variance_after(mostly_new, 0.1), 4.0 * variance_after(seen, 0.1));
+  EXPECT_NEAR(variance_after(mostly_new, 1.0), variance_after(seen, 1.0),
+              0.05 * variance_after(seen, 1.0));
+}
+
 // A bar that goes along 0.8 m to the left of the lidar, before all else, and a box around some of
 // what follows.
 Scan with_a_bar(const Scan& scan) {

@@ -20,9 +20,11 @@ void describe_lidar(ConfigTable& table, LidarNoiseConfig& config) {
   table.add("sigma_translation_m", config.sigma_translation_m, {1e-5, 10.0}, "m",
             "standard deviation of one match at good fitness");
   table.add("fitness_threshold_m2", config.fitness_threshold_m2, {0.0, 100.0}, "m^2",
-            "mean squared distance above which the standard deviation grows");
+            "mean squared distance above which the standard deviation grows; 0: as the method of "
+            "matching needs it");
   table.add("fitness_scale", config.fitness_scale, {0.0, 1e6}, "1/m^4",
-            "growth of that standard deviation with the square of the excess");
+            "growth of that standard deviation with the square of the excess; 0: as the method of "
+            "matching needs it");
   table.add("information_divisor", config.information_divisor, {1.0, 1e9}, "",
             "divisor of the matcher's information, because its points are not independent");
 }

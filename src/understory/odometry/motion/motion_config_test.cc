@@ -16,6 +16,8 @@ TEST(LidarCovariance, GrowsWithTheFitnessAsThePaperSays) {
   config.source = LidarNoise::kFitness;
   config.sigma_translation_m = 0.01;
   config.sigma_rotation_deg = 0.01 / kDegree;
+  config.fitness_threshold_m2 = 0.3;
+  config.fitness_scale = 2.0;
   LidarFactor factor;
   factor.fitness_m2 = 0.3;
   EXPECT_NEAR(std::sqrt(lidar_covariance(factor, config)(4, 4)), 0.01, 1e-12);

@@ -29,7 +29,7 @@ struct NavState {
 // What matching one scan to the local map said.
 struct LidarFactor {
   Pose world_from_body;                     // at the stamp of the scan
-  double fitness_m2 = 0.0;                  // mean squared distance of matches, lower is better
+  double fitness_m2 = 0.0;                  // overall_fitness_m2 of the match, lower is better
   Matrix6d information = Matrix6d::Zero();  // of a right perturbation, as the matcher gives it
   // The pose is of other sensors, with this covariance of a right perturbation: it counts instead
   // of fitness and information. Neither is the IMU judged by it, nor it by the IMU (P2-8).
@@ -148,8 +148,9 @@ struct LidarNoiseConfig {
   LidarNoise source = LidarNoise::kBoth;
   double sigma_rotation_deg = 0.05;   // floor of one match
   double sigma_translation_m = 0.01;  // floor of one match; 0.01 in the paper (0.57 deg, too)
-  double fitness_threshold_m2 = 0.3;  // tau of (36)
-  double fitness_scale = 2.0;         // theta of (36), 1/m^4
+  // tau and theta of (36); 0: those of the method that matches (FitnessNoise).
+  double fitness_threshold_m2 = 0.0;
+  double fitness_scale = 0.0;  // 1/m^4
   // The points of a scan are not independent: the matcher's information is divided by this.
   double information_divisor = 100.0;
 };

@@ -28,6 +28,7 @@ struct GaussianIcpConfig {
 struct PointToGaussianConfig {
   static constexpr const char* kName = "point_to_gaussian";
   static constexpr const char* kSummary = "nearest points, as three planes each";
+  static constexpr FitnessNoise kFitnessNoise{0.015, 860.0};  // of GICP
 
   GaussianIcpConfig icp;
 };
@@ -41,6 +42,7 @@ void describe(ConfigTable& table, PointToGaussianConfig& config);
 struct GaussianToGaussianConfig {
   static constexpr const char* kName = "gaussian_to_gaussian";
   static constexpr const char* kSummary = "the same, the source's surroundings too";
+  static constexpr FitnessNoise kFitnessNoise{0.015, 860.0};  // of GICP
 
   GaussianIcpConfig icp;
 };

@@ -14,6 +14,7 @@ namespace understory {
 struct GicpMatcherConfig {
   static constexpr const char* kName = "gicp";
   static constexpr const char* kSummary = "nearest points, plane to plane";
+  static constexpr FitnessNoise kFitnessNoise{0.015, 860.0};
 
   GicpConfig steps;
   IcpMapConfig map;

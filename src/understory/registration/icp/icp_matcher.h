@@ -15,6 +15,7 @@ namespace understory {
 struct IcpMatcherConfig {
   static constexpr const char* kName = "icp";
   static constexpr const char* kSummary = "nearest points, to their planes";
+  static constexpr FitnessNoise kFitnessNoise{0.014, 620.0};
 
   IcpConfig steps;
   IcpMapConfig map;

@@ -32,6 +32,7 @@ struct LoamConfig {
 struct LoamMatcherConfig {
   static constexpr const char* kName = "loam";
   static constexpr const char* kSummary = "edges and planes by the rings of a scan";
+  static constexpr FitnessNoise kFitnessNoise{0.013, 320.0};
 
   LoamConfig loam;
 };
@@ -46,6 +47,7 @@ void describe(ConfigTable& table, LoamMatcherConfig& config);
 struct LoamGroundMatcherConfig {
   static constexpr const char* kName = "loam_ground";
   static constexpr const char* kSummary = "ground and edges in two steps";
+  static constexpr FitnessNoise kFitnessNoise{0.013, 320.0};  // of LOAM
 
   LoamConfig loam;
 };

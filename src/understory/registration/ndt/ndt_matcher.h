@@ -14,6 +14,7 @@ namespace understory {
 struct NdtMatcherConfig {
   static constexpr const char* kName = "ndt";
   static constexpr const char* kSummary = "normal distributions in cells";
+  static constexpr FitnessNoise kFitnessNoise{0.067, 34.0};
 
   std::vector<double> cell_sizes_m = {2.0, 0.5};  // edges, coarse to fine
   // Edge of the cells for points whose finest cell has too few points for a distribution; 0: such

@@ -18,6 +18,7 @@ namespace understory {
 struct NdtD2dMatcherConfig {
   static constexpr const char* kName = "ndt_d2d";
   static constexpr const char* kSummary = "distributions to distributions";
+  static constexpr FitnessNoise kFitnessNoise{0.105, 24.0};
 
   static constexpr bool kSameSource = false;  // each grid has cells of its own of the source
 

@@ -18,6 +18,7 @@ namespace understory {
 struct VgicpMatcherConfig {
   static constexpr const char* kName = "vgicp";
   static constexpr const char* kSummary = "GICP to voxels instead of points";
+  static constexpr FitnessNoise kFitnessNoise{0.033, 170.0};
 
   static constexpr bool kSameSource = true;  // all grids see the source in the same way
 

@@ -181,8 +181,13 @@ void DenseFrontEnd::tell_of_imu(TimeNs now) {
 
 void DenseFrontEnd::make_odometry(const Rig& rig) {
   rig_ = rig;
+  DenseOdometryConfig config = config_.odometry;
+  const FitnessNoise usual = fitness_noise(config_.keyframe_map.local_map.matcher);
+  LidarNoiseConfig& noise = config.motion.lidar;
+  if (noise.fitness_threshold_m2 <= 0.0) noise.fitness_threshold_m2 = usual.threshold_m2;
+  if (noise.fitness_scale <= 0.0) noise.fitness_scale = usual.scale;
   odometry_ = std::make_unique<DenseOdometry>(
-      config_.odometry, rig_,
+      config, rig_,
       make_matcher(config_.keyframe_map.local_map.matcher)->feature_finder(), times_, log_);
 }
 
