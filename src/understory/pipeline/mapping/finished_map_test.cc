@@ -23,8 +23,9 @@ TEST(FinishedMap, CloudsMoveWithTheirKeyframes) {
   keyframes[1].world_from_body = Pose(so3_exp({0.0, 0.0, 2.0}), {20.0, 5.0, 1.0});
   MapTiles::Config config;
   config.thin_m = 0.0;
-  const auto tiles =
-      make_finished_map(clouds, keyframes, config, folder / "tiles", [](const ProgressReport&) {});
+  LeftOutCarrier none;
+  const auto tiles = make_finished_map(clouds, keyframes, config, folder / "tiles", none,
+                                       [](const ProgressReport&) {});
   std::map<std::uint16_t, std::pair<Eigen::Vector3d, TimeNs>> found;
   tiles->for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
     for (const MapPoint& p : points)
