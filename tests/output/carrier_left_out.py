@@ -1,4 +1,4 @@
-"""Posts and boom of a machine without boxes are no trees: the finished map leaves out what stays beside the lidar and is
+"""Posts and boom of a machine without boxes are no trees. The finished map leaves out what stays beside the lidar and is
 not seen there from elsewhere. With map.carrier.reach_m=0 they stand on the machine's own path. A stem near a path where
 nothing is carried stays, and so does everything where boxes are given."""
 

@@ -114,13 +114,13 @@ class CarrierSearch {
     elsewhere_.assign(grid_.size(), 0);
     for (const Stretch& stretch : stretches_)
       look_from_elsewhere(stretch);
-    bool any = false;
+    std::uint64_t shown = 0;
     for (std::size_t v = 0; v < candidate_.size(); ++v) {
       if (candidate_[v] == 0) continue;
       candidate_[v] = static_cast<double>(elsewhere_[v]) < kElsewhere * shown_[v] ? 1 : 0;
-      any = any || candidate_[v] != 0;
+      shown += candidate_[v] != 0 ? shown_[v] : 0;
     }
-    return any ? std::move(candidate_) : std::vector<std::uint8_t>();
+    return shown >= kFewestShown * used_ ? std::move(candidate_) : std::vector<std::uint8_t>();
   }
 
  private:

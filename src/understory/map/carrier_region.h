@@ -57,12 +57,12 @@ class CarrierRegion {
   std::vector<std::uint8_t> filled_;
 };
 
-// Finds the carrier in the clouds of a finished run: what stays at one place in the body frame
-// while the body moves, and is not there in the world. A voxel is of the carrier if `share` of the
-// clouds, taken at places 0.5 m apart, show it, and clouds from elsewhere show nothing where its
-// points lie in the world. Ground, walls and trunks beside a path are shown from elsewhere. Empty
-// where the body did not move by 4 m at least, or no such voxel is found. `lidar_in_body`: metres.
-// Looks at 60 clouds at most. Throws InputError where the file of the clouds is damaged.
+// Finds the carrier in the clouds of a finished run: what stays at one place in the body frame and
+// at none in the world. Clouds are taken at places 0.5 m apart, 60 at most. A voxel of the body
+// frame stays if `share` of them have points in it. It is of the carrier if other clouds show
+// nothing where most of these points lie in the world. Ground, walls and trunks beside a path are
+// shown from elsewhere. Empty where the body did not move by 4 m, or no such voxel is found.
+// `lidar_in_body`: metres. Throws InputError where the file of the clouds is damaged.
 [[nodiscard]] CarrierRegion find_carrier(const KeyframeClouds& clouds,
                                          const std::vector<Keyframe>& keyframes,
                                          std::span<const StampedPose> path,

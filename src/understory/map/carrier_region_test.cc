@@ -14,13 +14,14 @@ namespace {
 
 const Eigen::Vector3d kLidar(0.5, 0.0, 2.0);
 
-// A body that goes along x over level ground past a row of trunks and a wall, with a post of its
+// A body that goes along x over level ground, past a row of trunks and a wall. It has a post of its
 // own behind the lidar. Scans take 0.1 s and are deskewed.
 class CarrierTest : public testing::Test {
  protected:
   static TimeNs time_of(int scan) { return 100'000'000LL * scan; }
   // Metres between two scans.
   double step_m_ = 0.8;
+  double post_top_m_ = 2.9;
 
   [[nodiscard]] Pose pose_at(double scan) const {
     return Pose(so3_exp({0.0, 0.0, 0.02 * scan}), {step_m_ * scan, 0.0, 0.0});
@@ -51,7 +52,7 @@ class CarrierTest : public testing::Test {
       for (double z = 0.0; z < 4.0; z += 0.05)
         see(cloud, scan, {4.0 * trunk, -1.5, z});
     }
-    for (double z = 1.0; z < 2.9; z += 0.02)
+    for (double z = 1.0; z < post_top_m_; z += 0.02)
       see_own(cloud, scan, {-0.4, 0.7, z}, 0.9);
   }
   CarrierRegion find(int scans) {
@@ -89,6 +90,11 @@ TEST_F(CarrierTest, APostThatGoesAlongIsFoundAndTheWorldIsNot) {
 
 TEST_F(CarrierTest, NothingIsFoundWhereTheBodyHardlyMoved) {
   step_m_ = 0.15;
+  EXPECT_TRUE(find(20).empty());
+}
+
+TEST_F(CarrierTest, ASinglePointThatStaysIsNothing) {
+  post_top_m_ = 1.01;
   EXPECT_TRUE(find(20).empty());
 }
 

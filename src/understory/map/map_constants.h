@@ -36,6 +36,9 @@ inline constexpr double kShareBeside = 0.15;
 // Share of a voxel's points that others show from elsewhere: with more it is the world's [chosen;
 // tuusniemi1 seed 5: under 0.1 on its posts, over 0.9 on the ground]
 inline constexpr double kElsewhere = 0.5;
+// World voxels of the carrier's points in a cloud at least, on average: fewer are single flakes or
+// twigs [chosen: a post of 1 m has seven]
+inline constexpr std::uint64_t kFewestShown = 5;
 }  // namespace carrier_region
 
 namespace felled_trees {  // map/felled_trees.cc
