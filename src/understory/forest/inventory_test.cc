@@ -382,6 +382,28 @@ TEST(Inventory, AThinStemSeenInPartIsListed) {
   }
 }
 
+// A noisy stem from afar: each sweep shows a few pieces of it, and none shows the same.
+TEST(Inventory, AStemSeenInPiecesFromAfarIsListed) {
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    TestPlot plot(16);
+    plot.add_ground(12.0, 40);
+    Random random(seed);
+    for (int piece = 0; piece < 60; ++piece) {
+      const double turn = random.uniform(-50.0, 50.0) * M_PI / 180.0;
+      const double h = random.uniform(0.4, 4.0);
+      for (int i = 0; i < 20; ++i) {
+        const double at = turn + random.uniform(-0.15, 0.15);
+        const double r = 0.06 + random.normal(0.0, 0.01);
+        plot.cloud.emplace_back(6.0 + r * std::cos(at), 6.0 + r * std::sin(at),
+                                plot.ground(6.0, 6.0) + h + random.uniform(0.0, 0.1));
+      }
+    }
+    const std::vector<Tree> trees = take_inventory(blocks_of(plot.cloud), {}).trees;
+    ASSERT_EQ(trees.size(), 1U) << seed;
+    EXPECT_NEAR(trees[0].dbh_m, 0.12, 0.05) << seed;
+  }
+}
+
 TEST(Inventory, AnAirborneCloudSaysThatStemsAreNotSeen) {
   TestPlot plot(9);
   plot.add_ground(20.0, 4);
