@@ -350,7 +350,13 @@ TEST(Inventory, AStemHiddenAroundBreastHeightIsMeasuredAbove) {
   EXPECT_NEAR(above[0].dbh_m, 0.3, 2.0 * above[0].dbh_sd_m);
   EXPECT_NEAR(above[0].dbh_m, 0.3, 0.02);
   EXPECT_GT(above[0].dbh_sd_m, whole[0].dbh_sd_m);
-  EXPECT_TRUE(hidden_to(2.3).empty());
+  const std::vector<Tree> high = hidden_to(2.3);  // its deviation tells of the taper
+  ASSERT_EQ(high.size(), 1U);
+  EXPECT_NEAR(high[0].dbh_m, 0.3, 2.0 * high[0].dbh_sd_m);
+  EXPECT_GT(high[0].dbh_sd_m, above[0].dbh_sd_m);
+  // Less than a metre of it is a crown that may hang anywhere.
+  for (const Tree& tree : hidden_to(2.8))
+    EXPECT_TRUE(std::isnan(tree.dbh_m));
 }
 
 // Five eighths of a stem are seen, from afar: its diameter is uncertain, and that it stands is not.
@@ -371,6 +377,28 @@ TEST(Inventory, AThinStemSeenInPartIsListed) {
       ASSERT_EQ(trees.size(), 1U) << points << " " << seed;
       EXPECT_NEAR(trees[0].dbh_m, 0.12, 0.05);
     }
+  }
+}
+
+// A noisy stem from afar: each sweep shows a few pieces of it, and none shows the same.
+TEST(Inventory, AStemSeenInPiecesFromAfarIsListed) {
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    TestPlot plot(16);
+    plot.add_ground(12.0, 40);
+    Random random(seed);
+    for (int piece = 0; piece < 60; ++piece) {
+      const double turn = random.uniform(-50.0, 50.0) * M_PI / 180.0;
+      const double h = random.uniform(0.4, 4.0);
+      for (int i = 0; i < 20; ++i) {
+        const double at = turn + random.uniform(-0.15, 0.15);
+        const double r = 0.06 + random.normal(0.0, 0.01);
+        plot.cloud.emplace_back(6.0 + r * std::cos(at), 6.0 + r * std::sin(at),
+                                plot.ground(6.0, 6.0) + h + random.uniform(0.0, 0.1));
+      }
+    }
+    const std::vector<Tree> trees = take_inventory(blocks_of(plot.cloud), {}).trees;
+    ASSERT_EQ(trees.size(), 1U) << seed;
+    EXPECT_NEAR(trees[0].dbh_m, 0.12, 0.05) << seed;
   }
 }
 

@@ -54,7 +54,18 @@ inline constexpr double kAloneArcDeg = 90.0;
 // Sum of the ratios of a column that stands clear [tuned on `random` 13, docs/method/forest.md]
 inline constexpr double kClearClutter = 0.15;
 // m over breast height: its foot may be hidden so far up [tuned on `random` 13]
-inline constexpr double kClearBeginsAbove = 0.7;
+inline constexpr double kClearBeginsAbove = 1.3;
+// m that it extends at least [tuned on `random` 13]
+inline constexpr double kClearExtent = 1.0;
+// degrees of its circle that are seen evenly [tuned on `random` 13]
+inline constexpr double kClearArcDeg = 60.0;
+// Share of its directions that show a surface [tuned on `random` 13: a noisy stem from afar has
+// 0.52 and more, what shows another side in each slice less than that]
+inline constexpr double kClearFill = 0.5;
+// Radii: error of its radius at most [chosen: the deviation of its diameter is told]
+inline constexpr double kClearSd = 0.5;
+// Spreads of the refined fit that are its error [chosen: half of beam_footprint::kKnownSpread]
+inline constexpr double kClearSpreads = 1.4;
 // Radii: its scatter at most [chosen]
 inline constexpr double kClearScatterShare = 0.25;
 // Share of the slices between its ends that show a stem [tuned on simulated maps]

@@ -14,6 +14,33 @@
 // or real clouds and measurements by their page.
 namespace understory::map_constants {
 
+namespace carrier_region {  // map/carrier_region.cc
+// m: edge of the voxels around the lidar, as of CarrierReturns [chosen]
+inline constexpr double kVoxelM = 0.2;
+// m: edge of the world's voxels in which points from elsewhere are looked for; those that touch
+// count, too [chosen: wider than the errors of a map and of the motion within a scan]
+inline constexpr double kWorldVoxelM = 0.15;
+// m between the places of two clouds: what stands in the world leaves its voxel [chosen]
+inline constexpr double kApartM = 0.5;
+// clouds of a stretch at least [chosen]
+inline constexpr std::size_t kFewestClouds = 5;
+// m between the two farthest places of a stretch at least: ground around one is seen from the other
+// from beyond the usual reach [chosen: the reach and a metre]
+inline constexpr double kLeastWayM = 4.0;
+// Stretches of a run that are looked at [bound: time]
+inline constexpr std::size_t kStretches = 3;
+// Clouds of each [bound: time]
+inline constexpr std::size_t kCloudsOfStretch = 20;
+// Share of the clouds that show a voxel which touches one that stays [chosen]
+inline constexpr double kShareBeside = 0.15;
+// Share of a voxel's points that others show from elsewhere: with more it is the world's [chosen;
+// tuusniemi1 seed 5: under 0.1 on its posts, over 0.9 on the ground]
+inline constexpr double kElsewhere = 0.5;
+// World voxels of the carrier's points in a cloud at least, on average: fewer are single flakes or
+// twigs [chosen: a post of 1 m has seven]
+inline constexpr std::uint64_t kFewestShown = 5;
+}  // namespace carrier_region
+
 namespace felled_trees {  // map/felled_trees.cc
 // m in the plane within which a sight is of a tree [chosen]
 inline constexpr double kSameTreeM = 0.6;

@@ -127,29 +127,42 @@ double max_clutter(const StemFitResult& fit, double lean_deg) {
   return noisy ? std::min(limit, kNoisyClutter) : limit;
 }
 
+// From the lowest slice that shows a stem to the highest one.
+double slices_between(const StemFit& stem, const StemDetectorConfig& config) {
+  return std::floor(stem.highest_m / config.slice_m) - std::floor(stem.lowest_m / config.slice_m) +
+         1.0;
+}
+
+double lean_deg_of(const StemFit& stem) {
+  return std::atan(stem.slope.norm()) * 180.0 / M_PI;
+}
+
 // A slim column of points that stands alone: with a thin stem and noisy ranges its inside fills up,
 // but nothing else looks like that.
-bool stands_alone(const StemFitResult& fit, double slices_between, double lean_deg) {
+bool stands_alone(const StemFitResult& fit, const StemDetectorConfig& config) {
   const StemEvidence& e = fit.evidence;
   return fit.stem.radius_m <= kSlimRadius && e.outside_ratio <= kAloneOutside &&
-         lean_deg <= kAloneLeanDeg && fit.stem.highest_m - fit.stem.lowest_m >= kAloneExtent &&
-         e.slices >= kAloneSlices * slices_between && e.even_arc_deg >= kAloneArcDeg &&
+         lean_deg_of(fit.stem) <= kAloneLeanDeg &&
+         fit.stem.highest_m - fit.stem.lowest_m >= kAloneExtent &&
+         e.slices >= kAloneSlices * slices_between(fit.stem, config) &&
+         e.even_arc_deg >= kAloneArcDeg &&
          e.scatter_m <= kAloneScatterShare * fit.stem.radius_m + kAloneScatter;
 }
 
 // A column with hardly a point beside or inside it, from bottom to top: a stem that was seen from
 // one side, from afar. Its diameter may be uncertain, and what stands before it may hide its foot.
+// `radius_sd_m`: of the radius at breast height.
 bool is_clear_column(const StemFitResult& fit, const StemDetectorConfig& config,
-                     double slices_between, double lean_deg) {
+                     double radius_sd_m) {
   const StemFit& stem = fit.stem;
   const StemEvidence& e = fit.evidence;
-  const double sd = std::sqrt(std::max(0.0, stem.covariance(2, 2)));
-  return e.inside_ratio + e.outside_ratio <= kClearClutter && lean_deg <= kAloneLeanDeg &&
-         stem.highest_m - stem.lowest_m >= kAloneExtent &&
+  return e.inside_ratio + e.outside_ratio <= kClearClutter && lean_deg_of(stem) <= kAloneLeanDeg &&
+         stem.highest_m - stem.lowest_m >= kClearExtent &&
          stem.highest_m > config.highest_m - config.slice_m &&
          stem.lowest_m <= kBreastHeight + kClearBeginsAbove &&
-         e.slices >= kAloneSlices * slices_between && e.even_arc_deg >= kAloneArcDeg &&
-         e.scatter_m <= kClearScatterShare * stem.radius_m && sd <= kFewSlicesSd * stem.radius_m;
+         e.slices >= kAloneSlices * slices_between(stem, config) &&
+         e.even_arc_deg >= kClearArcDeg && e.scatter_m <= kClearScatterShare * stem.radius_m &&
+         radius_sd_m <= kClearSd * stem.radius_m;
 }
 
 // Is it a stem, or a bush that a cone happens to fit?
@@ -159,26 +172,24 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
   const StemEvidence& e = fit.evidence;
   const double dbh = 2.0 * stem.radius_m;
   const double dbh_sd = 2.0 * std::sqrt(std::max(0.0, stem.covariance(2, 2)));
-  const double lean_deg = std::atan(stem.slope.norm()) * 180.0 / M_PI;
+  const double lean_deg = lean_deg_of(stem);
   const double extent = stem.highest_m - stem.lowest_m;
   // Steep leans are rare, and a line through scattered points leans as it likes: they have to be
   // better supported.
   const double wanted_returns = config.min_returns * (1.0 + std::pow(lean_deg / kSteepLeanDeg, 2));
-  const double slices_between = std::floor(stem.highest_m / config.slice_m) -
-                                std::floor(stem.lowest_m / config.slice_m) + 1.0;
   if (dbh < config.min_dbh_m || dbh > config.max_dbh_m || lean_deg > config.max_lean_deg ||
       e.returns < wanted_returns || e.slices < config.min_slices ||
-      e.slices < kLeastSliceShare * slices_between ||
+      e.slices < kLeastSliceShare * slices_between(stem, config) ||
       extent < std::max(kLeastExtent, 2.0 * cut.thickness_m) || stem.arc_deg < config.min_arc_deg ||
-      e.even_arc_deg <
-          std::max(kEvenArcOfLeast * config.min_arc_deg, kEvenArcShare * stem.arc_deg)) {
+      e.even_arc_deg < kEvenArcOfLeast * config.min_arc_deg) {
     return false;
   }
-  if (is_clear_column(fit, config, slices_between, lean_deg)) return true;
+  if (is_clear_column(fit, config, std::sqrt(std::max(0.0, stem.covariance(2, 2))))) return true;
+  if (e.even_arc_deg < kEvenArcShare * stem.arc_deg) return false;
   // What begins higher is a branch or a crown.
   if (stem.lowest_m > kBreastHeight + kBeginsAbove || dbh_sd > kDbhSd + kDbhSdShare * dbh)
     return false;
-  if (stands_alone(fit, slices_between, lean_deg)) return true;
+  if (stands_alone(fit, config)) return true;
   // Where points are many, a stem shows in thin slices; what only thick ones show has to be clean.
   const double clutter = e.inside_ratio + e.outside_ratio;
   const bool dense = e.on > kDensePointsPerSlice * e.slices;
@@ -200,10 +211,12 @@ bool is_stem_still(const StemFitResult& fit, const StemDetectorConfig& config) {
   const StemEvidence& e = fit.evidence;
   if (!fit.converged || 2.0 * stem.radius_m < config.min_dbh_m ||
       2.0 * stem.radius_m > config.max_dbh_m || e.returns < config.min_returns ||
-      std::atan(stem.slope.norm()) * 180.0 / M_PI > config.max_lean_deg ||
-      stem.arc_deg < config.min_arc_deg || e.fill < kLeastFill) {
+      lean_deg_of(stem) > config.max_lean_deg || stem.arc_deg < config.min_arc_deg ||
+      e.fill < kClearFill) {
     return false;
   }
+  if (is_clear_column(fit, config, kClearSpreads * stem.spread_m)) return true;
+  if (e.fill < kLeastFill) return false;
   const double all = (config.highest_m - config.lowest_m) / config.slice_m;
   if (e.slices >= kShownByMost * all) return true;
   const double sd = std::sqrt(std::max(0.0, stem.covariance(2, 2)));

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <utility>
+#include <variant>
 
 #include "understory/output/report/report_parts.h"
 #include "understory/output/report/svg_plot.h"
@@ -188,6 +189,13 @@ void add_run(Tiles& tiles, const ReportInput& input) {
               "Time from the first scan to the last.");
     tiles.add(count_text(input.summary.scans), "scans",
               "A scan is one look of the lidar all around, often a tenth of a second.");
+  }
+  const auto carrier = input.summary.quality.find("carrier_points_percent");
+  if (carrier != input.summary.quality.end()) {
+    tiles.add(fmt::format("{:.1f} %", std::get<double>(carrier->second)),
+              "of the points are of the carrier",
+              "What carries the lidar stays at one place beside it, and other scans show nothing "
+              "where it was. These points are left out of the map.");
   }
   const auto scan = input.summary.stages.find("scan");
   if (scan != input.summary.stages.end()) {

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
+#include <vector>
 
 #include "understory/util/files/folder_test_support.h"
 
@@ -23,8 +25,9 @@ TEST(FinishedMap, CloudsMoveWithTheirKeyframes) {
   keyframes[1].world_from_body = Pose(so3_exp({0.0, 0.0, 2.0}), {20.0, 5.0, 1.0});
   MapTiles::Config config;
   config.thin_m = 0.0;
-  const auto tiles =
-      make_finished_map(clouds, keyframes, config, folder / "tiles", [](const ProgressReport&) {});
+  LeftOutCarrier none;
+  const auto tiles = make_finished_map(clouds, keyframes, config, folder / "tiles", none,
+                                       [](const ProgressReport&) {});
   std::map<std::uint16_t, std::pair<Eigen::Vector3d, TimeNs>> found;
   tiles->for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
     for (const MapPoint& p : points)
@@ -38,6 +41,27 @@ TEST(FinishedMap, CloudsMoveWithTheirKeyframes) {
   EXPECT_EQ(found[7].first,
             on_map_grid(keyframes[1].world_from_body * Eigen::Vector3d(0.0, 2.0, 0.0)));
   EXPECT_EQ(found[6].second, 1'101'000'000);
+}
+
+// What stays beside the lidar goes nowhere, and is counted.
+TEST(FinishedMap, TheCarrierIsLeftOut) {
+  const test::TemporaryFolder folder;
+  KeyframeClouds clouds(folder / "clouds.bin");
+  clouds.append({0, 0, {{1.0F, 0.1F, 0.1F, 5, 0}, {2.5F, 0.1F, 0.1F, 6, 0}}, {}});
+  const std::vector<Keyframe> keyframes(1);
+  const std::vector<StampedPose> path = {{0, {}}};
+  // Two voxels along each axis to each side of the lidar, all filled.
+  LeftOutCarrier carrier{CarrierRegion({1.0, 0.0, 0.0}, 0.4, std::vector<std::uint8_t>(64, 1)),
+                         path};
+  const auto tiles = make_finished_map(clouds, keyframes, {}, folder / "tiles", carrier, {});
+  std::vector<std::uint16_t> kept;
+  tiles->for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
+    for (const MapPoint& p : points)
+      kept.push_back(p.intensity);
+  });
+  EXPECT_EQ(kept, std::vector<std::uint16_t>{6});
+  EXPECT_EQ(carrier.points, 1U);
+  EXPECT_EQ(carrier.of, 2U);
 }
 
 }  // namespace

@@ -46,10 +46,11 @@ class DenseMap : public MapMaker {
     made_.trajectory = write_dense_trajectory(recording_.results, front_end_);
     place_on_globe();
     if (!front_end_.config().map_enabled) return;
+    find_own_points();
     const ScopedTimer timer(front_end_.times(), "finish_gather_map");
-    made_.tiles =
-        make_finished_map(front_end_.clouds(), front_end_.map().keyframes(),
-                          front_end_.config().map, recording_.work / "tiles", recording_.progress);
+    made_.tiles = make_finished_map(front_end_.clouds(), front_end_.map().keyframes(),
+                                    front_end_.config().map, recording_.work / "tiles",
+                                    made_.carrier, recording_.progress);
   }
 
   void list_trees() override {
@@ -72,6 +73,16 @@ class DenseMap : public MapMaker {
   RunOutcome write() override { return write_dense_results(recording_, front_end_, made_); }
 
  private:
+  // What carries the lidar, if nobody told by boxes.
+  void find_own_points() {
+    const DenseMappingConfig& config = front_end_.config();
+    if (!config.odometry.machine_boxes_file.empty()) return;
+    const ScopedTimer timer(front_end_.times(), "finish_find_carrier");
+    made_.carrier.path = made_.trajectory.trajectory;
+    made_.carrier.region = find_carrier(
+        front_end_.clouds(), front_end_.map().keyframes(), made_.carrier.path,
+        front_end_.rig().body_from_lidar.translation(), config.carrier, recording_.progress);
+  }
   // By the run's own fixes; gnss.csv.
   void place_on_globe() {
     const ScopedTimer timer(front_end_.times(), "finish_georeference");

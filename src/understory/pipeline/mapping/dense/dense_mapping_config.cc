@@ -39,6 +39,7 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
     table.add("thin_m", config.map.thin_m, {0.0, 1.0}, "m",
               "one point per cube of this edge of the finished map; 0: all");
     table.add("tile_m", config.map.tile_m, {1.0, 1000.0}, "m", "tiles in which it is finished");
+    table.section("carrier", [&] { describe(table, config.carrier); });
   });
   table.section("inventory", [&] { describe(table, config.inventory); });
   table.section("obstacles", [&] { describe(table, config.obstacles); });

@@ -7,6 +7,7 @@
 #include "understory/forest/inventory.h"
 #include "understory/forest/obstacles.h"
 #include "understory/georeference/satellites/satellite_belief.h"
+#include "understory/map/carrier_region.h"
 #include "understory/map/keyframes/keyframe_map.h"
 #include "understory/map/map_tiles.h"
 #include "understory/odometry/dense/dense_odometry.h"
@@ -32,6 +33,7 @@ struct DenseMappingConfig {
   double scan_fraction = 1.0;
   DenseOdometryConfig odometry;
   KeyframeMap::Config keyframe_map;
+  CarrierSearchConfig carrier;
   MapTiles::Config map;
   double keyframe_thin_m = 0.02;  // thins a scan's cloud before it is stored for the map
   double map_range_max_m = 60.0;  // farther returns do not enter the finished map

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <variant>
 
 #include "understory/forest/inventory.h"
 #include "understory/geometry/matrix_inverse.h"
@@ -255,6 +256,15 @@ RunEvidence evidence_of(const ReadRecording& recording, DenseFrontEnd& front_end
   return evidence;
 }
 
+// That points were taken for the carrier's own and left out; empty where none were.
+std::string carrier_in_words(const RunSummary& summary) {
+  const auto percent = summary.quality.find("carrier_points_percent");
+  if (percent == summary.quality.end()) return {};
+  return fmt::format(
+      "what carries the lidar was found: {:.1f} % of the points, which are left out of the map\n",
+      std::get<double>(percent->second));
+}
+
 std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& trajectory,
                              const InventoryResult& inventory,
                              const std::filesystem::path& folder) {
@@ -265,7 +275,8 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
     text += fmt::format(", {:.0f} ms a scan (99 %: {:.0f} ms)", scan->second.wall_ms.mean,
                         scan->second.wall_ms.p99);
   }
-  text += fmt::format("\n{} trees\n", inventory.trees.size()) + terminal_notes(inventory);
+  text += "\n" + carrier_in_words(summary);
+  text += fmt::format("{} trees\n", inventory.trees.size()) + terminal_notes(inventory);
   for (const std::string& reason : summary.reasons) {
     text += to_string(summary.status) + ": " + reason + "\n";
   }
@@ -310,6 +321,11 @@ void add_map(const ReadRecording& recording, const DenseMappingConfig& config, D
   note_doubts(made.inventory, documents.summary());
   documents.summary().quality["area_m2"] = made.inventory.area_m2;
   take_figures(config.inventory.stand, frames.layers, made, documents);
+  if (made.carrier.points > 0) {
+    documents.count("carrier_points", made.carrier.points);
+    documents.summary().quality["carrier_points_percent"] =
+        100.0 * static_cast<double>(made.carrier.points) / static_cast<double>(made.carrier.of);
+  }
   documents.count("map_points", write_map(recording, config, made, picture));
   if (!picture.empty()) documents.report().picture = &picture;
   documents.report().inventory = &made.inventory;

@@ -11,6 +11,7 @@
 #include "understory/pipeline/inventory/stand_plots.h"
 #include "understory/pipeline/mapping/dense/dense_front_end.h"
 #include "understory/pipeline/mapping/dense/dense_trajectory.h"
+#include "understory/pipeline/mapping/finished_map.h"
 #include "understory/pipeline/mapping/front_end.h"
 #include "understory/pipeline/mapping/tiled_map.h"
 #include "understory/pipeline/run_folder/run_outcome.h"
@@ -23,6 +24,7 @@ struct DenseProducts {
   std::optional<FoundPlacement> placement;  // where it was found before the map was made
   bool has_fixes = false;                   // of satellites
   PlacedMap placed;
+  LeftOutCarrier carrier;            // its path is that of `trajectory`
   std::unique_ptr<MapTiles> tiles;   // of the finished cloud
   std::unique_ptr<TiledMap> forest;  // the same as the inventory takes it, which goes before it
   InventoryResult inventory;
