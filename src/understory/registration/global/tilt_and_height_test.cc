@@ -34,7 +34,8 @@ struct LeaningStand {
     return 0.3 * std::sin(0.2 * p.x()) + 0.3 * std::cos(0.15 * p.y());
   }
   // What prepare_search would make of it, with the parts that the fit reads.
-  [[nodiscard]] SearchCloud seen_from(const Pose& world_from_lidar, std::uint64_t seed) const {
+  [[nodiscard]] SearchCloud seen_from(const Pose& world_from_lidar, std::uint64_t seed,
+                                      bool bushes = false) const {
     Random random(seed);
     SearchCloud cloud;
     cloud.few_rings = true;
@@ -63,7 +64,8 @@ struct LeaningStand {
         const Eigen::Vector2d place =
             world_from_lidar.translation().head<2>() +
             (5.0 + 2.5 * ring) * Eigen::Vector2d(std::cos(turn), std::sin(turn));
-        add({place.x(), place.y(), ground(place) + 0.02 * random.normal()}, 0.0);
+        const double bush = bushes && k % 5 < 2 ? 0.9 : 0.0;  // taken for ground
+        add({place.x(), place.y(), ground(place) + bush + 0.02 * random.normal()}, 0.0);
       }
     }
     cloud.axes = upright_axes(uprights, cloud.points, cloud.above_m);
@@ -85,7 +87,7 @@ struct Fitted {
 };
 
 // The fit from the true place and heading, with a wrong tilt and height.
-Fitted fitted(const Eigen::Vector2d& wrong_tilt_deg, double wrong_height_m) {
+Fitted fitted(const Eigen::Vector2d& wrong_tilt_deg, double wrong_height_m, bool bushes = false) {
   const LeaningStand stand(3);
   const Pose a = turned(0.0, 0.0, 2.0, 0.0, 0.0, 0.0);
   const Pose b = turned(5.0, 3.0, 2.3, 0.7, 0.01, -0.008);
@@ -94,7 +96,7 @@ Fitted fitted(const Eigen::Vector2d& wrong_tilt_deg, double wrong_height_m) {
                            wrong_tilt_deg.y() * kDegree);
   const Pose start(truth.rotation() * tilt.rotation(), truth.translation() + tilt.translation());
   Fitted done;
-  done.fit = fit_tilt_and_height(stand.seen_from(a, 1), stand.seen_from(b, 2), start);
+  done.fit = fit_tilt_and_height(stand.seen_from(a, 1), stand.seen_from(b, 2, bushes), start);
   done.off = right_difference(done.fit.target_from_source, truth);
   return done;
 }
@@ -107,6 +109,10 @@ TEST(TiltAndHeight, LeansOfStemsAndSharedGroundTellThem) {
     EXPECT_LT(done.off.head<2>().norm(), 0.2 * kDegree) << height;
     EXPECT_LT(std::abs(done.off[5]), 0.06) << height;
   }
+}
+
+TEST(TiltAndHeight, MostGroundTellsTheHeightWhereBushesHideSomeOfIt) {
+  EXPECT_LT(std::abs(fitted({0.5, 0.5}, -1.5, true).off[5]), 0.06);
 }
 
 TEST(TiltAndHeight, PlaceAndHeadingStay) {
