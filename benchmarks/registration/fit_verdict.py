@@ -5,7 +5,8 @@
 Prints the numbers of match_verdict::kWeights (registration/global/global_constants.h), and how many
 wrong poses and right poses each limit of the chance lets through. A pose is right within 0.5 m and 2
 degrees of the truth. Each pose counts twice: with and without what was seen through, as clouds that
-are no single view do not tell that. Needs numpy.
+are no single view do not tell that. Lines of verdict_pairs are read, too, and count once. On those of
+scans of few rings alone, the weights are match_verdict::kSparseWeights. Needs numpy.
 """
 
 import json
@@ -38,7 +39,15 @@ def read(files):
         for line in Path(file).read_text().splitlines():
             if not line.endswith("}"):
                 continue  # a run that was stopped
-            poses = json.loads(line)["poses"]
+            pair = json.loads(line)
+            if "poses" not in pair:  # of verdict_pairs
+                if pair["near"] > 0:
+                    rows.append(traits({**pair, "chance": pair["by_chance"]}, pair["rival"] < -8,
+                                       False))
+                    right.append(is_right(pair))
+                    best.append(True)
+                continue
+            poses = pair["poses"]
             for pose in poses:
                 for blind in (False, True):
                     rows.append(traits(pose, len(poses) == 1, blind))

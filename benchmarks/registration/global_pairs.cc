@@ -70,7 +70,8 @@ void match(const Sample& a, const Sample& b, bool same_place, std::size_t i, std
         how, same_place ? off.translation().norm() : 99.0, off.angle() * 180.0 / std::numbers::pi,
         score, rival, e.near, e.seen_through, e.looked_at, e.fine, e.fine_aside, e.peak_off_m,
         e.matched, e.by_chance,
-        chance_of_right(e, score, rival != score ? std::optional(rival) : std::nullopt));
+        chance_of_right(e, score, rival != score ? std::optional(rival) : std::nullopt,
+                        sparse_views(a.cloud, b.cloud)));
   };
   for (std::size_t k = 0; k < found.size(); ++k) {
     if (k > 0) std::printf(", ");

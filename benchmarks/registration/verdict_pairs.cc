@@ -84,6 +84,9 @@ void print(std::size_t i, std::size_t j, double shared, double apart_m, const Po
   const MatchVerdict& verdict = done.verdict;
   const PoseEvidence& e = verdict.evidence;
   const RegistrationResult& result = done.result;
+  // In the frame of the source: degrees about x, y, z, then metres along them.
+  Vector6d parts = off.log();
+  parts.head<3>() *= 180.0 / std::numbers::pi;
   double sd_m = -1.0;
   double sd_deg = -1.0;
   if (result.information.trace() > 0.0 && result.degenerate_directions.cols() == 0) {
@@ -93,14 +96,15 @@ void print(std::size_t i, std::size_t j, double shared, double apart_m, const Po
   }
   std::printf(
       "{\"i\": %zu, \"j\": %zu, \"overlap\": %.3f, \"apart_m\": %.2f, \"off_m\": %.4f, "
-      "\"off_deg\": %.4f, "
+      "\"off_deg\": %.4f, \"off\": [%.4f, %.4f, %.4f, %.4f, %.4f, %.4f], \"open\": %td, "
       "\"trusted\": %d, \"chance\": %.4f, \"moved_m\": %.4f, \"moved_deg\": %.4f, \"near\": %.4f, "
       "\"through\": %.4f, \"fine\": %.4f, \"aside\": %.4f, \"matched\": %.0f, \"by_chance\": %.2f, "
       "\"score\": %.3f, \"rival\": %.3f, \"sd_m\": %.5f, \"sd_deg\": %.5f, \"inlier\": %.4f, "
       "\"surface\": %.6f, \"fitness\": %.5f, \"peak\": %.3f, \"looked\": %.1f, \"ms\": %.1f, "
       "\"reason\": \"%s\"}\n",
       i, j, shared, apart_m, same_place ? off.translation().norm() : 99.0,
-      same_place ? off.angle() * 180.0 / std::numbers::pi : 180.0, verdict.trusted ? 1 : 0,
+      same_place ? off.angle() * 180.0 / std::numbers::pi : 180.0, parts[0], parts[1], parts[2],
+      parts[3], parts[4], parts[5], result.degenerate_directions.cols(), verdict.trusted ? 1 : 0,
       verdict.chance, number_or_none(verdict.moved_m), number_or_none(verdict.moved_deg), e.near,
       e.seen_through, e.fine, e.fine_aside, e.matched, e.by_chance, verdict.score,
       verdict.rival ? verdict.rival->score : -9.0, number_or_none(sd_m), number_or_none(sd_deg),
@@ -130,7 +134,9 @@ void match(const Sample& a, const Sample& b, bool same_place, std::size_t i, std
       const Pose guess = moved_at_random(same_place ? truth : Pose(), options, random);
       done = match_and_judge(
           a.cloud, b.cloud, guess,
-          [&](const Pose& from) { return a.target->match(b.source, from, {}, MatchStart::kFar); },
+          [&](const Pose& from, const PoseTerms& terms) {
+            return a.target->match(b.source, from, terms, MatchStart::kFar);
+          },
           found);
     }
     const double ms = 1e3 * (process_cpu_seconds() - begin);

@@ -116,15 +116,15 @@ MatchFrom matching(const RegisterOptions& options, const RegisterConfig& config,
         features_of_cloud(*finder, target, target_cloud.ring, config.target_voxel_m);
     const FeaturePoints b =
         features_of_cloud(*finder, source, source_cloud.ring, config.source_voxel_m);
-    return [matcher, a, b](const Pose& guess) {
-      return match_clouds_by_features(*matcher, a, b, guess);
+    return [matcher, a, b](const Pose& guess, const PoseTerms& terms) {
+      return match_clouds_by_features(*matcher, a, b, guess, terms);
     };
   }
   const Points thinned = filter.filter(source, config.source_voxel_m);
   const double voxel_m = matcher->sums_up_points() ? config.target_voxel_m : config.source_voxel_m;
   const MatchTargetPtr map = matcher->make_target(filter.filter(target, voxel_m));
-  return [map, thinned](const Pose& guess) {
-    return map->match(thinned, guess, {}, MatchStart::kFar);
+  return [map, thinned](const Pose& guess, const PoseTerms& terms) {
+    return map->match(thinned, guess, terms, MatchStart::kFar);
   };
 }
 

@@ -24,10 +24,11 @@ FeaturePoints features_of_cloud(const FeatureFinder& finder, const Points& point
 }
 
 RegistrationResult match_clouds_by_features(const Matcher& matcher, const FeaturePoints& target,
-                                            const FeaturePoints& source, const Pose& guess) {
+                                            const FeaturePoints& source, const Pose& guess,
+                                            const PoseTerms& terms) {
   const std::unique_ptr<TargetBuilder> builder = matcher.make_builder({});
   builder->insert_features(target, Pose(), std::nullopt);
-  return builder->snapshot()->match_features(source, guess, {}, MatchStart::kFar);
+  return builder->snapshot()->match_features(source, guess, terms, MatchStart::kFar);
 }
 
 }  // namespace understory

@@ -14,10 +14,11 @@ namespace understory {
                                               const std::vector<std::uint16_t>& ring,
                                               double voxel_m);
 
-// Matches a cloud of features to another one from a guess.
+// Matches a cloud of features to another one from a guess, with terms beside the points.
 [[nodiscard]] RegistrationResult match_clouds_by_features(const Matcher& matcher,
                                                           const FeaturePoints& target,
                                                           const FeaturePoints& source,
-                                                          const Pose& guess);
+                                                          const Pose& guess,
+                                                          const PoseTerms& terms);
 
 }  // namespace understory

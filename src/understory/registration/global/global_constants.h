@@ -199,6 +199,68 @@ inline constexpr double kFineCell = 0.5;
 inline constexpr double kThinnest = 0.03;
 }  // namespace search_cloud
 
+namespace tilt_and_height {  // registration/global/tilt_and_height.cc
+// m around an upright whose points tell how it leans, and their heights above the ground [chosen]
+inline constexpr double kReach = 0.5;
+// The next of these [chosen]
+inline constexpr float kLowest = 0.5F;
+// The next of these [chosen]
+inline constexpr float kHighest = 10.0F;
+// m beside the line through a stem: farther points are branches [chosen: thick stems]
+inline constexpr double kBeside = 0.25;
+// points of a stem at least, and m: standard deviation of their heights at least [chosen]
+inline constexpr double kFewestPoints = 4.0;
+// The next of these [chosen]
+inline constexpr double kLeastHeightSd = 0.4;
+// m: deviation of points of a stem from its line; lean per m that stems bend besides [chosen]
+inline constexpr double kPointSd = 0.05;
+// The next of these [chosen]
+inline constexpr double kLeanSd = 0.005;
+// Lean of a stem at most [chosen: 20 degrees]
+inline constexpr double kMostLean = 0.36;
+// m: stems that are nearer meet [as pose_evidence]
+inline constexpr double kMet = 0.35;
+// Standard deviations at which a residual counts half, in the last rounds. Then how much wider the
+// first round is, and by how much each next one narrows [tuned: harvester and lohja1 seed 11]
+inline constexpr double kCauchy = 0.8;
+// The next of these [tuned]
+inline constexpr double kWidest = 8.0;
+// The next of these [tuned]
+inline constexpr double kNarrower = 0.6;
+// m above the ground of what is on it [as search_cloud]
+inline constexpr float kOnGround = 0.3F;
+// m: ground of both clouds that is nearer is compared [chosen]
+inline constexpr double kNear = 0.7;
+// m, and m per m: deviation of a square metre of ground, and of its slope [chosen]
+inline constexpr double kGroundSd = 0.08;
+// The next of these [chosen]
+inline constexpr double kSlopeSd = 0.15;
+// squares around one whose ground tells its slope; weight of level ground there, m2 [chosen]
+inline constexpr int kSlopeReach = 4;
+// The next of these [chosen]
+inline constexpr double kLevelWeight = 20.0;
+// Share of the ground that counts as independent: what is hidden is off alike over many squares,
+// and would tilt the source [tuned: harvester and lohja1 seed 11]
+inline constexpr double kGroundShare = 0.02;
+// rad: how far level frames are tilted against each other [tuned: harvester and lohja1 seed 11]
+inline constexpr double kLevelSd = 0.03;
+// 1/m2 that keeps the height where no ground is shared [bound]
+inline constexpr double kHeightFloor = 1e-3;
+// Rounds of least squares, by leans alone and then with the ground [chosen]
+inline constexpr int kLeanRounds = 6;
+// The next of these [chosen]
+inline constexpr int kRounds = 6;
+// m: steps between rises of the source that are tried, and their number to either side [chosen:
+// hidden ground is off by up to 3 m]
+inline constexpr double kRiseStep = 0.1;
+// The next of these [chosen]
+inline constexpr int kRiseSteps = 30;
+// stems that meet at least for a fit that counts [chosen: more than meet by chance]
+inline constexpr int kFewestAxes = 8;
+// A direction with a smaller share of the strongest information is open [as NdtConfig]
+inline constexpr double kDegenerateRatio = 0.003;
+}  // namespace tilt_and_height
+
 namespace pose_evidence {  // registration/global/pose_evidence.cc
 // points of a quick look [bound: time]
 inline constexpr std::size_t kQuickPoints = 600;
@@ -246,6 +308,8 @@ inline constexpr double kSpread = 10.0;
 inline constexpr double kLevelSd = 0.005;
 // The same in the last steps, where dense scans tell it better [tuned: handheld OS1-64 seed 4]
 inline constexpr double kLastLevelSd = 0.01;
+// The same where something else tells the tilt [bound: none]
+inline constexpr double kNoLevelSd = 1e3;
 // uprights that tell anything beside NDT at least [chosen]
 inline constexpr int kFewestUprights = 6;
 // m, rad: nearer poses are one [chosen]
@@ -259,6 +323,11 @@ namespace match_verdict {  // registration/global/match_verdict.cc
 // over aside. Then log of matched over chance, and gap to the rival [tuned: by
 // benchmarks/registration/fit_verdict.py on seeds 3 to 5]
 inline constexpr std::array<double, 6> kWeights = {-16.75, 12.16, -1.28, 5.45, 0.30, 2.00};
+// The same between single scans of which one has few rings. They have fewer voxels in common, and
+// their tilt and height are of belief_of_sparse [tuned: harvester, lieksa2 and lohja1 seeds 11, 12]
+inline constexpr std::array<double, 6> kSparseWeights = {-9.79, 9.50, -1.09, 4.23, 0.35, 3.27};
+// m: standard deviation of the place of such a match at most [tuned: the same seeds]
+inline constexpr double kMostSparseSd = 0.15;
 // Floors of the shares in the logarithms [chosen: a few of 1500 points]
 inline constexpr double kThroughFloor = 0.003;
 // The next of these [chosen]

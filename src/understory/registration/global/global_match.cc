@@ -122,8 +122,17 @@ PoseTerms upright_terms(const GlobalCandidate& candidate, double level_sd_rad) {
 
 RegistrationResult last_steps(const SearchCloud& target, const SearchCloud& source,
                               const GlobalCandidate& candidate) {
-  return refine_pose(target, source, candidate.target_from_source,
-                     upright_terms(candidate, kLastLevelSd));
+  SparseBelief belief = belief_of_sparse(target, source, candidate.target_from_source);
+  if (belief.terms.empty()) {
+    return refine_pose(target, source, candidate.target_from_source,
+                       upright_terms(candidate, kLastLevelSd));
+  }
+  // The fit knows the tilt; uprights add place and heading.
+  const PoseTerms flat = upright_terms(candidate, kNoLevelSd);
+  belief.terms.insert(belief.terms.end(), flat.begin(), flat.end());
+  RegistrationResult result = refine_pose(target, source, belief.start, belief.terms);
+  count_terms(belief.terms, source.range_m, result);
+  return result;
 }
 
 RegistrationResult refine_pose(const SearchCloud& target, const SearchCloud& source,
@@ -134,7 +143,8 @@ RegistrationResult refine_pose(const SearchCloud& target, const SearchCloud& sou
 
 std::optional<Pose> refined_pose(const SearchCloud& target, const SearchCloud& source,
                                  const Pose& start) {
-  const RegistrationResult result = refine_pose(target, source, start);
+  const SparseBelief belief = belief_of_sparse(target, source, start);
+  const RegistrationResult result = refine_pose(target, source, belief.start, belief.terms);
   if (!result.usable()) return std::nullopt;
   return result.target_from_source;
 }

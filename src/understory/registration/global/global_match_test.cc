@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <vector>
 
@@ -115,20 +116,40 @@ TEST(MatchVerdict, AMatchFromABadGuessBeginsAgainWhereTheSearchPutsIt) {
   ndt.cell_sizes_m = {3.0, 1.0};
   const MatchTargetPtr target = make_matcher(ndt)->make_target(voxel_means(scans.target, 0.1));
   const Points source = voxel_means(scans.source, 0.25);
-  std::vector<Pose> guesses;
-  const MatchFrom match = [&](const Pose& guess) {
-    guesses.push_back(guess);
-    return target->match(source, guess, {}, MatchStart::kFar);
+  std::vector<std::size_t> terms_of;
+  const MatchFrom match = [&](const Pose& guess, const PoseTerms& terms) {
+    terms_of.push_back(terms.size());
+    return target->match(source, guess, terms, MatchStart::kFar);
   };
   const GlobalRegistration near =
       match_and_judge(scans.target, scans.source, scans.truth * turned(0.1, 0.0, 0.0, 0.01), match);
   EXPECT_TRUE(near.verdict.trusted) << near.verdict.reason;
-  EXPECT_EQ(guesses.size(), 1U);  // trusted at once
+  // Trusted at once: of such sparse scans a first match, and one with their tilt and height.
+  ASSERT_EQ(terms_of.size(), 2U);
+  EXPECT_EQ(terms_of[0], 0U);
+  EXPECT_EQ(terms_of[1], 1U);
   const GlobalRegistration far =
       match_and_judge(scans.target, scans.source, scans.truth * turned(6.0, 3.0, 0.0, 1.5), match);
   EXPECT_TRUE(far.verdict.trusted) << far.verdict.reason;
   expect_pose(far.result.target_from_source, scans.truth, 0.1, 0.5);
-  EXPECT_EQ(guesses.size(), 3U);
+  // Where the bad guess leads too few stems meet, so one match there and two at the second start.
+  ASSERT_EQ(terms_of.size(), 5U);
+  EXPECT_EQ(terms_of[2], 0U);
+  EXPECT_EQ(terms_of[3], 0U);
+  EXPECT_EQ(terms_of[4], 1U);
+}
+
+TEST(MatchVerdict, ASparseMatchThatTellsThePlaceLooselyIsRefused) {
+  const TwoScans& scans = two_scans();
+  RegistrationResult result;
+  result.status = RegistrationStatus::kConverged;
+  result.target_from_source = scans.truth;
+  for (const double sd_m : {0.02, 0.2}) {
+    result.information = Matrix6d::Identity() / (sd_m * sd_m / 3.0);
+    const MatchVerdict verdict = judged(scans, result);
+    EXPECT_EQ(verdict.trusted, sd_m < 0.1) << verdict.reason;
+    EXPECT_EQ(verdict.reason.find("share too little") != std::string::npos, sd_m > 0.1);
+  }
 }
 
 TEST(MatchVerdict, AMatchThatDidNotConvergeOrLeavesDirectionsOpenIsRefused) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,9 +10,11 @@
 #include <numbers>
 #include <optional>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "understory/registration/global/global_constants.h"
+#include "understory/registration/global/tilt_and_height.h"
 
 namespace understory {
 namespace {
@@ -63,16 +66,53 @@ MatchVerdict refused_verdict(std::string reason) {
   return verdict;
 }
 
+// A match, and of sparse clouds a second one with the tilt and the height that stems and ground
+// tell where the first came to.
+RegistrationResult match_twice(const SearchCloud& a, const SearchCloud& b, const Pose& guess,
+                               const MatchFrom& match) {
+  RegistrationResult first = match(guess, {});
+  if (!refusal_of(a, b).empty()) return first;
+  const Pose& came_to = first.usable() ? first.target_from_source : guess;
+  const SparseBelief belief =
+      belief_of_sparse(a, b, a.level_from_cloud * came_to * b.level_from_cloud.inverse());
+  if (belief.terms.empty()) return first;
+  PosePrior prior = std::get<PosePrior>(belief.terms.front());
+  prior.target_from_source =
+      a.level_from_cloud.inverse() * prior.target_from_source * b.level_from_cloud;
+  const Matrix6d to_level = b.level_from_cloud.adjoint();
+  prior.information = to_level.transpose() * prior.information * to_level;
+  const PoseTerms terms = {prior};
+  RegistrationResult second = match(prior.target_from_source, terms);
+  if (!second.usable()) return first;
+  count_terms(terms, b.range_m, second);
+  second.iterations += first.iterations;
+  return second;
+}
+
 std::string trouble_of(const RegistrationResult& result) {
   if (result.status != RegistrationStatus::kConverged)
     return result.reason.empty() ? to_string(result.status) : result.reason;
   return result.degenerate_directions.cols() > 0 ? "some directions are undetermined" : "";
 }
 
+// Refuses a match of sparse scans that tells the place too loosely. A result without information
+// tells nothing of it.
+void refuse_if_loose(const SearchCloud& target, const SearchCloud& source,
+                     const RegistrationResult& result, MatchVerdict& verdict) {
+  if (!verdict.trusted || !sparse_views(target, source) || !(result.information.trace() > 0.0))
+    return;
+  const Matrix6d covariance = result.information.inverse();
+  const double sd_m = std::sqrt(covariance.bottomRightCorner<3, 3>().trace());
+  if (sd_m < kMostSparseSd) return;
+  verdict.trusted = false;
+  verdict.reason =
+      fmt::format("the scans share too little to tell the place better than {:.2f} m", sd_m);
+}
+
 }  // namespace
 
 double chance_of_right(const PoseEvidence& evidence, double score,
-                       std::optional<double> rival_score) {
+                       std::optional<double> rival_score, bool sparse) {
   const double gap = rival_score ? std::clamp(score - *rival_score, kLeastGap, kMostGap) : kNoRival;
   const bool looked = evidence.looked_at > 0.0;
   const std::array<double, 6> traits = {
@@ -83,10 +123,15 @@ double chance_of_right(const PoseEvidence& evidence, double score,
       std::log((evidence.fine + kFineFloor) / (evidence.fine_aside + kFineFloor)),
       std::log((evidence.matched + 1.0) / (evidence.by_chance + 1.0)),
       gap};
+  const std::array<double, 6>& weights = sparse ? kSparseWeights : kWeights;
   double sum = 0.0;
   for (std::size_t i = 0; i < traits.size(); ++i)
-    sum += kWeights[i] * traits[i];
+    sum += weights[i] * traits[i];
   return 1.0 / (1.0 + std::exp(-sum));
+}
+
+bool sparse_views(const SearchCloud& target, const SearchCloud& source) {
+  return target.view && source.view && (target.few_rings || source.few_rings);
 }
 
 MatchVerdict judge_pose(const SearchCloud& target, const SearchCloud& source,
@@ -103,7 +148,8 @@ MatchVerdict judge_pose(const SearchCloud& target, const SearchCloud& source,
   }
   verdict.chance =
       chance_of_right(verdict.evidence, verdict.score,
-                      verdict.rival ? std::optional(verdict.rival->score) : std::nullopt);
+                      verdict.rival ? std::optional(verdict.rival->score) : std::nullopt,
+                      sparse_views(target, source));
   if (const std::optional<Pose> refined = refined_pose(target, source, target_from_source)) {
     const Pose on = target_from_source.inverse() * *refined;
     verdict.moved_m = on.translation().norm();
@@ -130,19 +176,22 @@ MatchVerdict judge_match(const SearchCloud& a, const SearchCloud& b,
   if (std::string refusal = refusal_of(a, b); !refusal.empty())
     return refused_verdict(std::move(refusal));
   const Pose pose = a.level_from_cloud * result.target_from_source * b.level_from_cloud.inverse();
-  return judge_pose(a, b, pose, found);
+  MatchVerdict verdict = judge_pose(a, b, pose, found);
+  refuse_if_loose(a, b, result, verdict);
+  return verdict;
 }
 
 GlobalRegistration match_and_judge(const SearchCloud& a, const SearchCloud& b, const Pose& guess,
                                    const MatchFrom& match,
                                    const std::vector<GlobalCandidate>& found) {
   GlobalRegistration done;
-  done.result = match(guess);
+  done.result = match_twice(a, b, guess, match);
   done.verdict = judge_match(a, b, done.result, found);
   if (done.verdict.trusted || found.empty()) return done;
   GlobalRegistration again;
-  again.result =
-      match(a.level_from_cloud.inverse() * found.front().target_from_source * b.level_from_cloud);
+  again.result = match_twice(
+      a, b, a.level_from_cloud.inverse() * found.front().target_from_source * b.level_from_cloud,
+      match);
   again.verdict = judge_match(a, b, again.result, found);
   if (!again.verdict.trusted) return done;
   again.result.iterations += done.result.iterations;
@@ -177,6 +226,7 @@ GlobalRegistration register_globally(const SearchCloud& a, const SearchCloud& b)
   }
   done.result = last_steps(a, b, found.front());
   done.verdict = judge_pose(a, b, done.result.target_from_source, found);
+  refuse_if_loose(a, b, done.result, done.verdict);
   if (const std::string trouble = trouble_of(done.result); !trouble.empty()) {
     done.verdict.trusted = false;
     done.verdict.reason = trouble;

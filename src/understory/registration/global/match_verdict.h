@@ -37,8 +37,12 @@ struct MatchVerdict {
 
 // The chance that a pose is right, by logistic regression on simulated and real pairs
 // (benchmarks/registration/fit_verdict.py). `rival_score`: of the best other pose, if there is one.
+// `sparse`: see sparse_views.
 [[nodiscard]] double chance_of_right(const PoseEvidence& evidence, double score,
-                                     std::optional<double> rival_score);
+                                     std::optional<double> rival_score, bool sparse = false);
+
+// Whether both clouds are single scans and one of them has few rings.
+[[nodiscard]] bool sparse_views(const SearchCloud& target, const SearchCloud& source);
 
 // Judges a pose between the level frames of two clouds. `found`: what search_poses gave for them.
 // Thread-safe, deterministic.
@@ -47,7 +51,8 @@ struct MatchVerdict {
                                       const std::vector<GlobalCandidate>& found);
 
 // The same for the outcome of any method, between the frames of the points (metres, z about up). A
-// match that did not converge, or that leaves directions open, is never trusted.
+// match that did not converge, or that leaves directions open, is never trusted. Nor is one of
+// sparse scans whose information leaves the place open by more than 0.15 m (standard deviation).
 [[nodiscard]] MatchVerdict judge_match(const SearchCloud& target, const SearchCloud& source,
                                        const RegistrationResult& result,
                                        const std::vector<GlobalCandidate>& found);
@@ -58,12 +63,15 @@ struct GlobalRegistration {
   MatchVerdict verdict;
 };
 
-// What a method makes of a guess; poses between the frames of the points.
-using MatchFrom = std::function<RegistrationResult(const Pose& guess)>;
+// What a method makes of a guess and of terms beside the points; poses between the frames of the
+// points.
+using MatchFrom = std::function<RegistrationResult(const Pose& guess, const PoseTerms& terms)>;
 
 // The match that a method makes from a guess, with its verdict. Where that is not trusted, the
 // method begins again at the best pose of a search without a guess. That answer is taken if it is
-// trusted. The frames are those of the points; `found`: what search_poses gave for the clouds.
+// trusted. Sparse clouds are matched twice: the second time with the tilt and the height that stems
+// and ground tell at the first pose (belief_of_sparse). The frames are those of the points;
+// `found`: what search_poses gave for the clouds.
 [[nodiscard]] GlobalRegistration match_and_judge(const SearchCloud& target,
                                                  const SearchCloud& source, const Pose& guess,
                                                  const MatchFrom& match,

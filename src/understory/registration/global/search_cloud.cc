@@ -162,6 +162,9 @@ SearchCloud prepare_search(const Points& points) {
   cloud.plants = some_of(cloud, kPlants, [](float above) { return above > kAbove; });
   cloud.ground = some_of(cloud, kGround, [](float above) { return above < kOnGround; });
   cloud.uprights = find_uprights(cloud.points, cloud.above_m, kUprights);
+  cloud.few_rings = points.size() < kFewRings;
+  cloud.axes = upright_axes(cloud.uprights, cloud.points, cloud.above_m);
+  cloud.ground_means = ground_means(cloud.points, cloud.above_m);
   for (const Eigen::Vector3f& point : cloud.points)
     cloud.voxels.set(key_of(point), 0);
   cloud.near = std::make_shared<const NearGrid>(cloud.points);
@@ -170,10 +173,10 @@ SearchCloud prepare_search(const Points& points) {
     for (Upright& upright : cloud.uprights)
       upright.at *= 1.0 + kBehind / std::max(upright.at.norm(), 1.0);
   }
-  cloud.target = ndt_target(cloud, {kCoarseCell, kMiddleCell}, points.size() < kFewRings);
+  cloud.target = ndt_target(cloud, {kCoarseCell, kMiddleCell}, cloud.few_rings);
   // Small cells of a sparse scan hold too little for a distribution, and leave directions open.
   cloud.fine_target =
-      points.size() < kFewRings ? cloud.target : ndt_target(cloud, {kMiddleCell, kFineCell}, false);
+      cloud.few_rings ? cloud.target : ndt_target(cloud, {kMiddleCell, kFineCell}, false);
   return cloud;
 }
 

@@ -10,6 +10,7 @@
 #include "understory/geometry/pose.h"
 #include "understory/geometry/voxel_index.h"
 #include "understory/registration/global/range_view.h"
+#include "understory/registration/global/tilt_and_height.h"
 #include "understory/registration/global/uprights.h"
 #include "understory/registration/matcher.h"
 
@@ -43,6 +44,10 @@ struct SearchCloud {
   Points ground;               // those on the ground, at most a few hundred
   double range_m = 0.0;        // mean distance of the points from the origin
   std::vector<Upright> uprights;
+  // What tells tilt and height of a cloud of few rings; empty for a dense one.
+  bool few_rings = false;
+  std::vector<UprightAxis> axes;
+  std::vector<Eigen::Vector3d> ground_means;
   std::shared_ptr<const NearGrid> near;
   VoxelIndex voxels;  // those of 0.2 m that hold points, by voxel_key
   // What a lidar at the origin saw; none where the cloud is no single view.
