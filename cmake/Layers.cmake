@@ -121,7 +121,8 @@ endfunction()
 # A Python script, run in the environment of tools/python-env.sh; exit status 0 is a pass. It skips
 # when a module of NEEDS cannot be imported. The script finds the program in UNDERSTORY_PROGRAM and
 # the example data in UNDERSTORY_DATA, and may itself skip with exit status 77. With PACKAGES it runs
-# in an environment of its own, of that list of packages (below the top folder).
+# in an environment of its own, of that list of packages (below the top folder). Those with the longest limits start
+# first: a long test that starts last would leave processors idle.
 function(understory_python_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "SCRIPT;TIMEOUT;PACKAGES" "NEEDS;ARGUMENTS")
   if(NOT UNDERSTORY_TESTS)
@@ -135,7 +136,7 @@ function(understory_python_test name)
            COMMAND "${PROJECT_SOURCE_DIR}/tools/python-test.sh" "${needs}"
                    "${CMAKE_CURRENT_SOURCE_DIR}/${arg_SCRIPT}" ${arg_ARGUMENTS})
   set_tests_properties(python.${name} PROPERTIES
-    SKIP_RETURN_CODE 77 TIMEOUT ${arg_TIMEOUT}
+    SKIP_RETURN_CODE 77 TIMEOUT ${arg_TIMEOUT} COST ${arg_TIMEOUT}
     ENVIRONMENT "UNDERSTORY_PROGRAM=${PROJECT_BINARY_DIR}/understory;UNDERSTORY_BUILD=${PROJECT_BINARY_DIR};UNDERSTORY_PACKAGES=${arg_PACKAGES}")
 endfunction()
 

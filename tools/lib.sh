@@ -11,7 +11,7 @@ fail() {
   exit 1
 }
 
-# As many jobs as cores, but no more than memory bears (about 1.5 GB for the largest file).
+# As many jobs as cores, but no more than memory bears (about 1.5 GB for a large file).
 jobs_that_fit() {
   local cores memory_kb by_memory
   cores=$(nproc)

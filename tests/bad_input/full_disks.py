@@ -8,7 +8,7 @@ import subprocess
 from program import Cases, good_recording, program, snapshot, two_runs
 
 cases = Cases()
-good, messages, truth = good_recording(seconds=8, more=("stand.size_x_m=40", "stand.size_y_m=40"))
+good, messages, truth = good_recording(seconds=8, more=("stand.size_x_m=24", "stand.size_y_m=24"))
 RUN, STEMS, FIXES = two_runs(good)
 COMMANDS = {
     "inventory": ["inventory", RUN / "map.laz", "--copc"],

@@ -15,6 +15,11 @@ SymmetricEigen3 fast_symmetric_eigen(const Eigen::Matrix3d& matrix) {
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
+SymmetricEigen3 symmetric_eigen(const Eigen::Matrix3d& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(matrix);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
 Eigen::Vector3d symmetric_eigenvalues(const Eigen::Matrix3d& matrix) {
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix, Eigen::EigenvaluesOnly)
       .eigenvalues();

@@ -25,6 +25,9 @@ struct SymmetricEigen3 {
 // space.
 [[nodiscard]] SymmetricEigen3 fast_symmetric_eigen(const Eigen::Matrix3d& matrix);
 
+// The same by QR steps: to the last digits.
+[[nodiscard]] SymmetricEigen3 symmetric_eigen(const Eigen::Matrix3d& matrix);
+
 // The eigenvalues alone, ascending, by QR steps: to the last digits.
 [[nodiscard]] Eigen::Vector3d symmetric_eigenvalues(const Eigen::Matrix3d& matrix);
 

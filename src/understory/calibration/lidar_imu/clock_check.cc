@@ -1,13 +1,14 @@
 #include "understory/calibration/lidar_imu/clock_check.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "understory/calibration/calibration_constants.h"
 #include "understory/calibration/lidar_imu/coloured_fit.h"
+#include "understory/geometry/large_solvers.h"
 #include "understory/geometry/pose.h"
+#include "understory/geometry/symmetric_solver.h"
 
 namespace understory {
 
@@ -189,9 +190,10 @@ std::optional<ClockCheckResult> LidarImuClockCheck::result() const {
   }
   if (found.duration_s < kShortestCheckedS) return std::nullopt;
   equations.information += weak_information();
-  const LidarImuMatrix covariance = calibration_constants::lidar_imu_calibration::kPathsAreWorse *
-                                    equations.information.ldlt().solve(LidarImuMatrix::Identity());
-  const LidarImuStep step = -equations.information.ldlt().solve(equations.gradient);
+  const LargeSymmetricSolver solver(equations.information);
+  const LidarImuMatrix covariance =
+      calibration_constants::lidar_imu_calibration::kPathsAreWorse * solver.inverse();
+  const LidarImuStep step = -solver.solve(equations.gradient);
   found.late_s = step[kLatenessParameter];
   found.late_sd_s = std::sqrt(covariance(kLatenessParameter, kLatenessParameter));
   if (!(found.late_sd_s < kMostToldSdS)) return std::nullopt;
@@ -200,7 +202,7 @@ std::optional<ClockCheckResult> LidarImuClockCheck::result() const {
   found.turned_rad = turned.norm();
   const Eigen::Matrix3d turns = covariance.topLeftCorner<3, 3>();
   const Vector3d axis = turned.stableNormalized();
-  found.turned_sd_rad = 1.0 / std::sqrt(axis.dot(turns.ldlt().solve(axis)));
+  found.turned_sd_rad = 1.0 / std::sqrt(axis.dot(SymmetricSolver<3>(turns).solve(axis)));
   return found;
 }
 

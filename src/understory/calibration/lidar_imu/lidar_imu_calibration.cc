@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -13,6 +11,8 @@
 #include "understory/calibration/calibration_constants.h"
 #include "understory/calibration/lidar_imu/coloured_fit.h"
 #include "understory/geometry/best_rotation.h"
+#include "understory/geometry/large_solvers.h"
+#include "understory/geometry/symmetric_eigen.h"
 
 namespace understory {
 
@@ -67,8 +67,7 @@ Fit fit(const std::vector<PathRun>& runs, const ImuBuffer& imu, const LidarImuSt
     }
     equations.information += given.information;
     equations.gradient += given.information * step_from(given.state, result.state);
-    const LidarImuMatrix covariance =
-        equations.information.ldlt().solve(LidarImuMatrix::Identity());
+    const LidarImuMatrix covariance = LargeSymmetricSolver(equations.information).inverse();
     LidarImuStep step = -(covariance * equations.gradient);
     // The samples of the IMU reach so far beyond the ends of the runs only.
     const double late = result.state.imu_late_s - given.state.imu_late_s;
@@ -144,12 +143,12 @@ Eigen::Vector3d mean_gravity(const std::vector<PathRun>& runs, const ImuBuffer& 
 
 // Makes `given` strong along the directions of three parameters that the fit does not tell.
 int keep_directions(const Fit& fit, Eigen::Index first, double most_sd, Given& given) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(
-      fit.covariance.block<3, 3>(first, first));
+  const SymmetricEigen3 axes =
+      symmetric_eigen(Eigen::Matrix3d(fit.covariance.block<3, 3>(first, first)));
   int kept = 0;
   for (Eigen::Index k = 0; k < 3; ++k) {
-    if (axes.eigenvalues()[k] < most_sd * most_sd) continue;
-    const Eigen::Vector3d axis = axes.eigenvectors().col(k);
+    if (axes.values[k] < most_sd * most_sd) continue;
+    const Eigen::Vector3d axis = axes.vectors.col(k);
     given.information.block<3, 3>(first, first) += kKept * axis * axis.transpose();
     ++kept;
   }

@@ -1,12 +1,12 @@
 #include "understory/calibration/lidar_imu/online_calibration.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "understory/calibration/calibration_constants.h"
+#include "understory/geometry/large_solvers.h"
 #include "understory/geometry/pose_io.h"
+#include "understory/geometry/symmetric_eigen.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -32,27 +32,27 @@ Vector7 units() {
 Matrix7 told_by(const Matrix7& covariance) {
   const Vector7 scale = units().cwiseInverse();
   const Matrix7 scaled = scale.asDiagonal() * covariance * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix7> axes(scaled);
+  const SymmetricEigen7 axes = symmetric_eigen(scaled);
   Matrix7 information = Matrix7::Zero();
   for (Eigen::Index k = 0; k < 7; ++k) {
-    if (axes.eigenvalues()[k] < kKeptVariance) continue;
-    const Vector7 axis = axes.eigenvectors().col(k);
-    information += axis * axis.transpose() / axes.eigenvalues()[k];
+    if (axes.values[k] < kKeptVariance) continue;
+    const Vector7 axis = axes.vectors.col(k);
+    information += axis * axis.transpose() / axes.values[k];
   }
   return information;
 }
 
 // Whether `step` is farther from none than chance explains, and than `least`; directions without a
 // variance are not asked.
-template <int N>
-bool far_from_none(const Eigen::Matrix<double, N, 1>& step,
-                   const Eigen::Matrix<double, N, N>& covariance, double least) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> axes(covariance);
-  for (Eigen::Index k = 0; k < N; ++k) {
-    const double sd = std::sqrt(std::max(axes.eigenvalues()[k], 0.0));
-    const double along = std::abs(axes.eigenvectors().col(k).dot(step));
-    if (sd > 0.0 && along > std::max(kTakeSigmas * sd, least)) return true;
-  }
+bool far_from_none(double step, double variance, double least) {
+  const double sd = std::sqrt(std::max(variance, 0.0));
+  return sd > 0.0 && std::abs(step) > std::max(kTakeSigmas * sd, least);
+}
+
+bool far_from_none(const Eigen::Vector3d& step, const Eigen::Matrix3d& covariance, double least) {
+  const SymmetricEigen3 axes = symmetric_eigen(covariance);
+  for (Eigen::Index k = 0; k < 3; ++k)
+    if (far_from_none(axes.vectors.col(k).dot(step), axes.values[k], least)) return true;
   return false;
 }
 
@@ -112,12 +112,12 @@ void OnlineImuCalibration::end_window() {
 std::optional<OnlineImuEstimate> OnlineImuCalibration::so_far() const {
   if (windows_ == 0) return std::nullopt;
   OnlineImuEstimate estimate;
-  const Eigen::SelfAdjointEigenSolver<Matrix7d> axes(information_);
+  const SymmetricEigen7 axes = symmetric_eigen(information_);
   Matrix7d covariance = Matrix7d::Zero();
   for (Eigen::Index k = 0; k < 7; ++k) {
-    if (axes.eigenvalues()[k] < 1.0) continue;  // not told
-    const Vector7d axis = axes.eigenvectors().col(k);
-    covariance += axis * axis.transpose() / axes.eigenvalues()[k];
+    if (axes.values[k] < 1.0) continue;  // not told
+    const Vector7d axis = axes.vectors.col(k);
+    covariance += axis * axis.transpose() / axes.values[k];
   }
   const Vector7d step = (covariance * weighted_).cwiseProduct(units());
   estimate.covariance = units().asDiagonal() * covariance * units().asDiagonal();
@@ -126,11 +126,11 @@ std::optional<OnlineImuEstimate> OnlineImuCalibration::so_far() const {
   estimate.late_s = step[6];
   estimate.duration_s = duration_s_;
   estimate.windows = windows_;
-  estimate.differs =
-      far_from_none<3>(step.head<3>(), estimate.covariance.topLeftCorner<3, 3>(), kTakeTurnRad) ||
-      far_from_none<3>(step.segment<3>(3), estimate.covariance.block<3, 3>(3, 3), kTakePlaceM) ||
-      far_from_none<1>(step.tail<1>(), estimate.covariance.bottomRightCorner<1, 1>(),
-                       kTakeLatenessS);
+  estimate.differs = far_from_none(Eigen::Vector3d(step.head<3>()),
+                                   estimate.covariance.topLeftCorner<3, 3>(), kTakeTurnRad) ||
+                     far_from_none(Eigen::Vector3d(step.segment<3>(3)),
+                                   estimate.covariance.block<3, 3>(3, 3), kTakePlaceM) ||
+                     far_from_none(step[6], estimate.covariance(6, 6), kTakeLatenessS);
   return estimate;
 }
 

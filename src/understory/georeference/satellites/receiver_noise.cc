@@ -1,12 +1,12 @@
 #include "understory/georeference/satellites/receiver_noise.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
+#include "understory/geometry/large_solvers.h"
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/error.h"
 #include "understory/util/random.h"
@@ -44,7 +44,7 @@ double plain_sd_m(const NoisyTimes& times, const std::vector<NoisySeries>& serie
   // What the prior forbids must not explain residuals.
   const double variance = std::max(1e-12, squares / rows);
   normal += variance * information;
-  const double left = squares - right.dot(normal.ldlt().solve(right));
+  const double left = squares - right.dot(LargeSymmetricSolver(normal).solve(right));
   return std::sqrt(std::max(1e-12, left / rows));
 }
 
@@ -134,12 +134,12 @@ Solution solve_with(const NoisyTimes& times, Rows rows, const MatrixXd& informat
   }
   Solution solution;
   const MatrixXd hessian = normal.topLeftCorner(n, n) + information;
-  const Eigen::LDLT<MatrixXd> solver(hessian);
-  solution.covariance = solver.solve(MatrixXd::Identity(n, n));
+  const LargeSymmetricSolver solver(hessian);
+  solution.covariance = solver.inverse();
   solution.mean = solver.solve(normal.topRightCorner(n, 1));
   const double cost = normal(n, n) - normal.topRightCorner(n, 1).col(0).dot(solution.mean);
   const double log_hessian =
-      solver.vectorD().cwiseMax(std::numeric_limits<double>::min()).array().log().sum();
+      solver.diagonal().cwiseMax(std::numeric_limits<double>::min()).array().log().sum();
   solution.log_likelihood = -0.5 * (logs + log_hessian + cost);
   return solution;
 }
@@ -271,9 +271,9 @@ void measure_curvature(const Posterior& posterior, Mode& mode, Unknowns* slope) 
       bend(i, j) = bend(j, i) = -(both - forward(i) - forward(j) + mode.log_density) / (h * h);
     }
   }
-  const Eigen::SelfAdjointEigenSolver<Curvature> axes(bend);
-  const Unknowns widths = axes.eigenvalues().cwiseMax(kLeastCurvature).cwiseInverse();
-  mode.covariance = axes.eigenvectors() * widths.asDiagonal() * axes.eigenvectors().transpose();
+  const SymmetricEigen7 axes = symmetric_eigen(bend);
+  const Unknowns widths = axes.values.cwiseMax(kLeastCurvature).cwiseInverse();
+  mode.covariance = axes.vectors * widths.asDiagonal() * axes.vectors.transpose();
   if (slope) *slope = (forward - backward) / (2.0 * h);
 }
 
