@@ -19,6 +19,8 @@ Eigen::MatrixXd LargeSymmetricSolver::inverse() const {
   return factor_.solve(Eigen::MatrixXd::Identity(factor_.rows(), factor_.rows()));
 }
 
-Eigen::VectorXd LargeSymmetricSolver::diagonal() const { return factor_.vectorD(); }
+Eigen::VectorXd LargeSymmetricSolver::diagonal() const {
+  return factor_.vectorD();
+}
 
 }  // namespace understory

@@ -4,8 +4,8 @@
 
 namespace understory {
 
-// Solvers of larger symmetric matrices, as fits of a calibration or of a receiver's noise need them.
-// Eigen's templates are compiled for them once, and not in every file.
+// Solvers of larger symmetric matrices, as fits of a calibration or of a receiver's noise need
+// them. Eigen's templates are compiled for them once, and not in every file.
 
 // Eigenvalues, ascending, and the unit eigenvectors that belong to them, one a column.
 struct SymmetricEigen7 {

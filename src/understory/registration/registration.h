@@ -88,11 +88,10 @@ struct RegistrationResult {
   }
 };
 
-// The fitness of P4 (36) over all points of the source, m^2: a point without a match counts as one
+// The fitness of P4 (36) over all points of the source, m^2. A point without a match counts as one
 // at the reach of the target (MatchTarget::reach_m), metres.
 [[nodiscard]] inline double overall_fitness_m2(const RegistrationResult& result, double reach_m) {
-  return result.inlier_ratio * result.fitness_m2 +
-         (1.0 - result.inlier_ratio) * reach_m * reach_m;
+  return result.inlier_ratio * result.fitness_m2 + (1.0 - result.inlier_ratio) * reach_m * reach_m;
 }
 
 }  // namespace understory

@@ -227,8 +227,8 @@ PartEstimate DenseOdometry::match_part(const Scan& part, const MatchTarget& loca
   estimate.matched = match.usable() && match.inlier_ratio >= least;
   estimate.world_from_body = predicted.world_from_body;
   if (!estimate.matched) return estimate;
-  const LidarFactor factor{match.target_from_source,
-                           overall_fitness_m2(match, local_map.reach_m()), match.information};
+  const LidarFactor factor{match.target_from_source, overall_fitness_m2(match, local_map.reach_m()),
+                           match.information};
   estimate.world_from_body =
       fuse(predicted, factor.world_from_body, lidar_covariance(factor, config_.motion.lidar));
   return estimate;

@@ -187,8 +187,8 @@ void DenseFrontEnd::make_odometry(const Rig& rig) {
   if (noise.fitness_threshold_m2 <= 0.0) noise.fitness_threshold_m2 = usual.threshold_m2;
   if (noise.fitness_scale <= 0.0) noise.fitness_scale = usual.scale;
   odometry_ = std::make_unique<DenseOdometry>(
-      config, rig_,
-      make_matcher(config_.keyframe_map.local_map.matcher)->feature_finder(), times_, log_);
+      config, rig_, make_matcher(config_.keyframe_map.local_map.matcher)->feature_finder(), times_,
+      log_);
 }
 
 // An empty map, and an odometry that knows the IMU before the first scan and the motion assumed.
