@@ -6,7 +6,7 @@ NDT runs on the first two KITTI scans of UNDERSTORY_DATA: the same thinning (0.2
 no guess. CPU time is the least of the rounds, of preparation and alignment. kiss-matcher runs on the
 scans of DIR, or on simulated ones of harvester (16 rings), beside our search without a guess. Right is
 within 0.5 m and 2 degrees. PCL comes as Debian's packages, unpacked into the cache and not installed,
-and kiss-matcher from PyPI into an environment of its own.
+and kiss-matcher from PyPI, with the hashes of its lock file, into an environment of its own.
 """
 
 import argparse
@@ -14,7 +14,6 @@ import json
 import os
 import subprocess
 import tempfile
-import venv
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -24,7 +23,7 @@ DATA = Path(os.environ.get("UNDERSTORY_DATA", ROOT.parent / "shared" / "data"))
 PCL = ["libpcl-dev"] + [f"libpcl-{part}1.13" for part in (
     "registration", "common", "kdtree", "search", "features", "filters", "octree",
     "sample-consensus")] + ["libflann1.9", "libflann-dev"]
-KISS_MATCHER = "kiss-matcher==1.0.2"
+KISS_MATCHER = "benchmarks/peers/registration/kiss-matcher.txt"
 
 
 def pcl_ndt():
@@ -49,13 +48,9 @@ def pcl_ndt():
 
 
 def kiss_matcher_python():
-    folder = CACHE / "kiss-matcher"
-    python = folder / "bin/python"
-    if not (folder / "done").exists():
-        venv.create(folder, with_pip=True)
-        subprocess.run([python, "-m", "pip", "-q", "install", KISS_MATCHER, "numpy"], check=True)
-        (folder / "done").touch()
-    return python
+    made = subprocess.run([ROOT / "tools/python-env.sh", KISS_MATCHER], check=True,
+                          capture_output=True, text=True)
+    return made.stdout.split()[-1]
 
 
 def lines_of(command, **others):

@@ -10,7 +10,7 @@ room=$(mktemp -d)
 trap 'rm -rf "$room"' EXIT
 python3 -m venv "$room/env"
 "$room/env/bin/python" -m pip install -q --disable-pip-version-check uv
-for list in benchmarks/peers/newcomers/*.txt benchmarks/peers/inventory/*.txt tests/recording/hands.txt; do
+for list in benchmarks/peers/*/*.txt tests/recording/hands.txt; do
   for version in 3.11 3.13; do
     say "locking $list for Python $version"
     # glibc 2.36 is that of Debian 12.
