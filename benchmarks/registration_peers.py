@@ -5,8 +5,8 @@
 NDT runs on the first two KITTI scans of UNDERSTORY_DATA: the same thinning (0.25 m) and cells (1 m),
 no guess. CPU time is the least of the rounds, of preparation and alignment. kiss-matcher runs on the
 scans of DIR, or on simulated ones of harvester (16 rings), beside our search without a guess. Right is
-within 0.5 m and 2 degrees. PCL comes as Debian's packages, unpacked into the cache and not installed,
-and kiss-matcher from PyPI, with the hashes of its lock file, into an environment of its own.
+within 0.5 m and 2 degrees. PCL comes as Debian's packages, unpacked into the cache and not installed.
+kiss-matcher comes from PyPI, with the hashes of its lock file, into an environment of its own.
 """
 
 import argparse

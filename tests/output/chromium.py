@@ -19,7 +19,8 @@ class Browser:
     def __init__(self, width=1280, height=900, mobile=False):
         commands_in, self.commands = os.pipe()
         self.answers, answers_out = os.pipe()
-        self.home = tempfile.TemporaryDirectory()
+        # Its children may still write while it ends.
+        self.home = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
 
         def connect():  # Chromium reads commands from file 3 and writes answers to file 4
             read_end, write_end = os.dup(commands_in), os.dup(answers_out)
