@@ -37,8 +37,8 @@ def steps(seed, keep):
     yield "speed", ["bench"], True
     for site in ["handheld", "harvester", *SITES]:
         yield f"peers {site}", ["bench", "peers", "--sites", site, "--duration-s", "180", "--seed", *one], True
-    for name in ("stems", "georeference", "registration", "registration-peers", "online", "imu-noise",
-                 "parts", "weather", "resume"):
+    for name in ("stems", "georeference", "registration", "registration-peers", "match-noise", "online",
+                 "imu-noise", "parts", "weather", "resume"):
         yield name, ["bench", name], False
     yield "power cut", ["accuracy", "--power-cut"], False
     yield "checkpoint cost", ["accuracy", "--checkpoint-cost"], False

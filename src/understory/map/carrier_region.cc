@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "understory/geometry/path_pose.h"
 #include "understory/geometry/voxel_index.h"
 #include "understory/geometry/voxel_key.h"
 #include "understory/map/map_constants.h"
@@ -16,18 +17,7 @@ namespace {
 using namespace map_constants::carrier_region;
 
 constexpr std::uint32_t kNoVoxel = UINT32_MAX;
-
-Pose pose_at(std::span<const StampedPose> path, TimeNs time) {
-  if (path.size() == 1) return path.front().world_from_body;
-  auto after = std::lower_bound(path.begin(), path.end(), time,
-                                [](const StampedPose& p, TimeNs t) { return p.stamp < t; });
-  after = std::clamp(after, path.begin() + 1, path.end() - 1);
-  const StampedPose& from = *(after - 1);
-  const auto span = static_cast<double>(after->stamp - from.stamp);
-  if (!(span > 0.0)) return after->world_from_body;
-  const double u = static_cast<double>(time - from.stamp) / span;
-  return interpolate(from.world_from_body, after->world_from_body, std::clamp(u, 0.0, 2.0));
-}
+constexpr double kBeyond = 1.0;  // steps of the path: the last scan ends after its last pose
 
 // A cube of voxels around the lidar.
 struct Grid {
@@ -265,10 +255,10 @@ PlacesAsMeasured::PlacesAsMeasured(const KeyframeCloud& cloud, std::span<const S
   std::uint16_t last = 0;
   for (const KeyframePoint& point : cloud.points)
     last = std::max(last, point.t_10us);
-  const Pose world_from_body = pose_at(path, cloud.stamp);
+  const Pose world_from_body = pose_on_path(path, cloud.stamp, kBeyond);
   for (std::uint32_t t = 0; t <= last; t += kStep10us) {
     const TimeNs middle = cloud.stamp + TimeNs{10'000} * (t + kStep10us / 2);
-    then_from_body_.push_back(pose_at(path, middle).inverse() * world_from_body);
+    then_from_body_.push_back(pose_on_path(path, middle, kBeyond).inverse() * world_from_body);
   }
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "understory/geometry/stamped_pose.h"
+#include "understory/geometry/path_pose.h"
 #include "understory/odometry/odometry_constants.h"
 #include "understory/preprocess/deskew.h"
 #include "understory/util/angles.h"
@@ -22,18 +22,6 @@ struct CellPoint {
   float slope = 0.0F;      // tangent of the elevation
   float intensity = 0.0F;
 };
-
-// Between the two poses about a time; the first or last one outside of them.
-Pose pose_at(const std::vector<StampedPose>& path, TimeNs at) {
-  const auto after =
-      std::lower_bound(path.begin(), path.end(), at,
-                       [](const StampedPose& pose, TimeNs time) { return pose.stamp < time; });
-  if (after == path.begin()) return path.front().world_from_body;
-  if (after == path.end()) return path.back().world_from_body;
-  const StampedPose& before = *(after - 1);
-  return interpolate(before.world_from_body, after->world_from_body,
-                     to_seconds(at - before.stamp) / to_seconds(after->stamp - before.stamp));
-}
 
 // reference_from_body over the time of the scans, by even motion.
 std::vector<StampedPose> even_path(TimeNs from, TimeNs to, TimeNs stamp, const Vector6d& per_s) {
@@ -62,9 +50,9 @@ void turn_by_gyroscope(std::vector<StampedPose>& path, TimeNs stamp, const Rig& 
         (turned.back().world_from_body.rotation() * so3_exp(seconds * rate)).normalized();
     turned.push_back({samples[i].stamp, Pose(turn, Eigen::Vector3d::Zero())});
   }
-  const Eigen::Quaterniond reference = pose_at(turned, stamp).rotation().conjugate();
+  const Eigen::Quaterniond reference = pose_on_path(turned, stamp).rotation().conjugate();
   for (StampedPose& pose : path) {
-    pose.world_from_body = Pose(reference * pose_at(turned, pose.stamp).rotation(),
+    pose.world_from_body = Pose(reference * pose_on_path(turned, pose.stamp).rotation(),
                                 pose.world_from_body.translation());
   }
 }
@@ -78,7 +66,7 @@ std::vector<CellPoint> cells_of(std::span<const ScanPtr> scans,
     std::vector<std::uint8_t> keep;
     if (boxes != nullptr) keep = outside_machine(*scan, rig, *boxes);
     const BodyCloud cloud = deskew(*scan, rig, path, keep).cloud;
-    const Pose lidar_from_scan = lidar_from_body * pose_at(path, scan->stamp);
+    const Pose lidar_from_scan = lidar_from_body * pose_on_path(path, scan->stamp);
     for (std::size_t i = 0; i < cloud.size(); ++i) {
       const Eigen::Vector3d point = lidar_from_scan * cloud.points[i].cast<double>();
       const double range = point.head<2>().norm();
