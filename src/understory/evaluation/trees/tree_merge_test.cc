@@ -66,24 +66,19 @@ TEST(TreeMerge, AConstantFieldIsPreservedThoughTreesAreMissing) {
 TEST(TreeMerge, TheFieldOfAPathIsThatOfTheTreesBesideIt) {
   const std::vector<Tree> s = stand(1, 200);
   const DeformationField field = deformation_field(s, bent(s, 3, 0.0, 0.0), {});
-  std::vector<Eigen::Vector2d> path;
-  for (int k = 0; k < 20; ++k)
-    path.emplace_back(s[0].x + 0.5 * k, s[0].y);
+  std::vector<Eigen::Vector2d> path;  // past every tree, half a metre beside it
+  for (const Tree& tree : s)
+    path.emplace_back(tree.x + 0.5, tree.y);
   path.emplace_back(s[0].x + 1e4, s[0].y);  // nothing is near
   const std::vector<Eigen::Vector2d> along = field_at(s, field, path);
-  for (std::size_t k = 0; k < 20; ++k) {
-    double nearest_m = 1e9;
-    Eigen::Vector2d of_nearest = Eigen::Vector2d::Zero();
-    for (std::size_t i = 0; i < s.size(); ++i) {
-      const double away_m = (Eigen::Vector2d(s[i].x, s[i].y) - path[k]).norm();
-      if (away_m < nearest_m) {
-        nearest_m = away_m;
-        of_nearest = field.smoothed[i];
-      }
-    }
-    EXPECT_LT((along[k] - of_nearest).norm(), 0.15) << "at " << k;
-    EXPECT_GT(along[k].norm(), 0.05);
+  double off = 0.0;
+  double spread = 0.0;
+  for (std::size_t k = 0; k < s.size(); ++k) {
+    off += (along[k] - field.smoothed[k]).squaredNorm();
+    spread += (field.smoothed[0] - field.smoothed[k]).squaredNorm();
   }
+  // The bend differs from place to place, and the path takes that of each.
+  EXPECT_LT(off, 0.04 * spread);
   EXPECT_EQ(along.back().norm(), 0.0);
 }
 
