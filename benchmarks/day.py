@@ -47,7 +47,7 @@ def measured(row, hours, seed, threads, folder):
         raise Failed(f"{row}: exit code {done.code}: {done.stderr.strip()[-800:]}")
     result = json.loads((folder / "run.json").read_text())
     result["resumed"] = unfinished
-    result["process"] = {"cpu_s": done.cpu_s, "peak_memory_mb": done.peak_memory_mb}
+    result["process"] = {"cpu_s": done.cpu_s, "peak_memory_mb": result["peak_memory_mb"]}
     return result
 
 

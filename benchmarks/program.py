@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import resource
 import subprocess
 import sys
 import time
@@ -31,7 +32,8 @@ class Finished:
 
 
 def run(*arguments, cpus=None):
-    """Runs a command; its CPU time and memory are the kernel's figures for that process."""
+    """Runs a command; its CPU time and memory are the kernel's figures for that process. The kernel's peak of memory
+    begins with that of the process that starts it: no peak is told where this process had as much."""
     command = [str(a) for a in arguments]
     begin = time.perf_counter()
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -41,8 +43,9 @@ def run(*arguments, cpus=None):
         out, err = process.stdout.read(), process.stderr.read()
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
-    return Finished(process.returncode, time.perf_counter() - begin,
-                    usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024 / 1e6, out, err)
+    own_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    peak_mb = usage.ru_maxrss * 1024 / 1e6 if usage.ru_maxrss > own_kib else float("nan")
+    return Finished(process.returncode, time.perf_counter() - begin, usage.ru_utime + usage.ru_stime, peak_mb, out, err)
 
 
 def understory(*arguments, accept=(DONE,), cpus=None):
@@ -63,14 +66,15 @@ def simulated(site, **keys):
 
 
 def map_recording(recording, folder, threads=2, settings=(), cpus=None, more=()):
-    """Maps a recording; returns its run.json with the kernel's figures under 'process'."""
+    """Maps a recording; returns its run.json with the kernel's CPU time, and the program's own peak of memory, under
+    'process'."""
     arguments = ["map", recording, "-o", folder, "--threads", threads, "--overwrite", *more]
     for setting in settings:
         arguments += ["--set", setting]
     done = understory(*arguments, accept=(DONE, UNTRUSTED), cpus=cpus)
     result = json.loads((Path(folder) / "run.json").read_text())
     result["process"] = {"cpu_s": done.cpu_s, "wall_s": done.wall_s,
-                         "peak_memory_mb": done.peak_memory_mb}
+                         "peak_memory_mb": result["peak_memory_mb"]}
     return result
 
 

@@ -55,7 +55,7 @@ def corrected(stems, folder, *settings):
     done = understory("correct", stems, "-o", folder, "--overwrite", "--threads", 1, *options,
                       accept=(DONE, UNTRUSTED))
     result = json.loads((folder / "run.json").read_text())
-    result["process"] = {"cpu_s": done.cpu_s, "peak_memory_mb": done.peak_memory_mb}
+    result["process"] = {"cpu_s": done.cpu_s, "peak_memory_mb": result["peak_memory_mb"]}
     return result
 
 

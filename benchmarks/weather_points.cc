@@ -45,7 +45,7 @@ BodyCloud cloud_of(const Scan& scan, const std::vector<TruePoint>& truth,
 void count(const Scan& scan, const std::vector<TruePoint>& truth, WeatherFilter& filter,
            Counts* counts) {
   std::vector<std::uint8_t> keep;
-  drop_isolated(scan, {}, keep);
+  if (!filter.judges(scan)) drop_isolated(scan, {}, keep);
   BodyCloud cloud = cloud_of(scan, truth, keep);
   filter.drop(cloud, Pose());
   filter.remember(Pose());

@@ -42,6 +42,22 @@ inline constexpr double kOdometryErrorM = 0.03;
 inline constexpr double kOdometryErrorShare = 0.02;
 // Share of the distrust that is left at the next fix [chosen: gone after some ten seconds]
 inline constexpr double kDistrustKept = 0.95;
+// Standard deviation of a fix, its largest axis, up to which it holds the path, m [chosen: RTK]
+inline constexpr double kHeldSdM = 0.15;
+// and how far the antenna may be from it, m [bound: what shows a stem twice]
+inline constexpr double kHeldM = 0.3;
+// Heading of a map that positions hold, degrees, one standard deviation [chosen: about what whole
+// skidoo, seed 3, has]
+inline constexpr double kMapHeadingDeg = 0.3;
+// Of a heading by a second antenna whose receiver does not say how good it is, degrees [chosen: as
+// for the online georeference]
+inline constexpr double kHeadingSdDeg = 0.5;
+// How well the line between the antennas is known on the body, degrees [chosen: 5 mm on a metre]
+inline constexpr double kBaselineSdDeg = 0.3;
+// By how much a map may have turned, degrees; a heading that is farther off does not count [chosen]
+inline constexpr double kMostTurnDeg = 5.0;
+// m to the points of a heading without a position [bound: 1 m at the antenna counts nothing there]
+inline constexpr double kFarArmM = 1000.0;
 // Standard deviation of a height that nothing tells, m [chosen: as good as nothing]
 inline constexpr double kUnknownM = 1e3;
 // and of an angle, rad [chosen: as good as nothing]

@@ -97,6 +97,15 @@ inline constexpr double kRoomToGrow = 0.7;
 inline constexpr double kLeastRadiusM = 20.0;
 }  // namespace local_map
 
+namespace returning_keyframes {  // map/keyframes/returning_keyframes.cc
+// Share of the radius within which a keyframe comes back [chosen: what is nearer than the rim stays
+// while the carrier comes nearer still]
+inline constexpr double kNear = 0.5;
+// Keyframes that come back beside a new one, at most [bound: time of a scan; there are as many on
+// the old way as on the new one]
+inline constexpr std::size_t kMostAtOnce = 3;
+}  // namespace returning_keyframes
+
 namespace keyframe_map {  // map/keyframes/keyframe_map.cc
 // Keyframes whose points stay in memory, about 60 MB [bound: memory]
 inline constexpr std::size_t kCachedKeyframes = 150;

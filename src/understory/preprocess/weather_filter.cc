@@ -66,6 +66,13 @@ std::size_t WeatherFilter::drop(BodyCloud& cloud, const Pose& world_from_body) {
   return dropped;
 }
 
+bool WeatherFilter::judges(const Scan& scan) const {
+  return config_.enabled &&
+         std::any_of(scan.points.begin(), scan.points.end(), [&](const ScanPoint& point) {
+           return point.intensity != scan.points.front().intensity;
+         });
+}
+
 void WeatherFilter::look(const BodyCloud& cloud) {
   now_.points = cloud.points;
   now_.range = cloud.range;

@@ -8,6 +8,7 @@
 #include "understory/geometry/pose.h"
 #include "understory/preprocess/body_cloud.h"
 #include "understory/preprocess/range_grid.h"
+#include "understory/sensor/scan.h"
 #include "understory/util/config/config.h"
 #include "understory/util/files/binary_io.h"
 
@@ -42,6 +43,8 @@ class WeatherFilter {
   std::size_t drop(BodyCloud& cloud, const Pose& world_from_body);
   // The cloud that `drop` saw last has this pose: it is one of the scans before from now on.
   void remember(const Pose& world_from_body);
+  // Whether it judges the returns of a scan: it is enabled, and they have intensities.
+  [[nodiscard]] bool judges(const Scan& scan) const;
   // The world was moved (loop closure).
   void move_world(const Pose& new_world_from_old_world);
   void save(BinaryWriter& writer) const;

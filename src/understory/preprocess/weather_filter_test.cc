@@ -47,6 +47,17 @@ BodyCloud moved(BodyCloud cloud, const Pose& pose) {
   return cloud;
 }
 
+// Where it judges, the filter of lone returns is left out.
+TEST(WeatherFilter, JudgesScansWithIntensitiesWhereItIsEnabled) {
+  Scan scan;
+  scan.points.resize(3);
+  EXPECT_FALSE(WeatherFilter(switched_on()).judges(scan));
+  scan.points[2].intensity = 7.0F;
+  EXPECT_TRUE(WeatherFilter(switched_on()).judges(scan));
+  EXPECT_FALSE(WeatherFilter({}).judges(scan));
+  EXPECT_FALSE(WeatherFilter(switched_on()).judges(Scan()));
+}
+
 TEST(WeatherFilter, DarkReturnsThatStandAloneGoAndNothingElse) {
   BodyCloud cloud = wall();
   const std::size_t of_wall = cloud.size();

@@ -1,6 +1,7 @@
 #include "understory/registration/penalties.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 
 #include "understory/util/error.h"
 
@@ -70,8 +71,9 @@ PoseTerm penalty_term(const PoseBelief& belief, PenaltyForm form, double arm_m, 
   if (form == PenaltyForm::kDirect) return direct_term(belief);
   PointPenalties penalties{{point_at(belief, Eigen::Vector3d::Zero())}, scale};
   if (form == PenaltyForm::kThreePoints) {
-    penalties.points.push_back(point_at(belief, -arm_m * Eigen::Vector3d::UnitZ()));
-    penalties.points.push_back(point_at(belief, arm_m * heading_of(belief.target_from_source)));
+    const double arm = std::max(arm_m, belief.least_arm_m);
+    penalties.points.push_back(point_at(belief, -arm * Eigen::Vector3d::UnitZ()));
+    penalties.points.push_back(point_at(belief, arm * heading_of(belief.target_from_source)));
   }
   return penalties;
 }

@@ -14,6 +14,9 @@ struct PoseBelief {
   Eigen::Vector3d point_in_source = Eigen::Vector3d::Zero();          // the antenna, metres
   Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Identity();  // of the antenna, m^2
   Eigen::Matrix3d attitude_covariance = Eigen::Matrix3d::Identity();  // rotation vector, rad^2
+  // The points of gravity and heading lie at least as far away, metres: where they are to say
+  // nothing of the position.
+  double least_arm_m = 0.0;
 };
 
 // The belief of a pose whose right perturbation (rotation first) has this covariance. The antenna

@@ -7,6 +7,7 @@
 
 #include "understory/geometry/pose_io.h"
 #include "understory/georeference/georeference_constants.h"
+#include "understory/georeference/satellites/satellite_pairs.h"
 #include "understory/sensor/fix_position.h"
 #include "understory/sensor/sensor_io.h"
 #include "understory/util/angles.h"
@@ -25,11 +26,14 @@ Matrix3d turned(const Pose& world_from_enu, const Matrix3d& covariance) {
   return rotation * covariance * rotation.transpose();
 }
 
-// The part of a rotation that is about the z axis.
-Eigen::Quaterniond about_up(const Eigen::Quaterniond& rotation) {
+// The part of a rotation that is about the z axis: its angle, rad, and as a rotation.
+double turn_about_up(const Eigen::Quaterniond& rotation) {
   const Matrix3d turn = rotation.toRotationMatrix();
-  const double heading = std::atan2(turn(1, 0) - turn(0, 1), turn(0, 0) + turn(1, 1));
-  return Eigen::Quaterniond(Eigen::AngleAxisd(heading, Vector3d::UnitZ()));
+  return std::atan2(turn(1, 0) - turn(0, 1), turn(0, 0) + turn(1, 1));
+}
+
+Eigen::Quaterniond about_up(const Eigen::Quaterniond& rotation) {
+  return Eigen::Quaterniond(Eigen::AngleAxisd(turn_about_up(rotation), Vector3d::UnitZ()));
 }
 
 double heading_of(const Vector3d& direction) {
@@ -37,6 +41,39 @@ double heading_of(const Vector3d& direction) {
 }
 
 const Vector3d kPlane(1.0, 1.0, 0.0);
+
+// Where the antenna is, and how well that is known.
+struct AntennaBelief {
+  Vector3d place;
+  Matrix3d covariance;
+};
+
+// What a fix still says of an antenna that the odometry puts at `by_odometry`, if its own error
+// stays. Nothing where that is within what is free, else the edge of that region. Plane and height
+// each by itself.
+AntennaBelief beyond_free(const AntennaBelief& fix, const Vector3d& by_odometry,
+                          const SatelliteBeliefConfig& config) {
+  AntennaBelief left = fix;
+  const auto free_steps = [&](double sd) {
+    return config.free_sd * std::max(0.0, 1.0 - config.followed_sd_m / sd);
+  };
+  const auto share = [](double free, double steps) { return free < steps ? free / steps : 1.0; };
+  const Vector3d off = by_odometry - fix.place;
+  const Eigen::Matrix2d plane = fix.covariance.topLeftCorner<2, 2>();
+  const double steps = std::sqrt(off.head<2>().dot(plane.inverse() * off.head<2>()));
+  const double of_plane = share(free_steps(std::sqrt(0.5 * plane.trace())), steps);
+  const double height_sd = std::sqrt(fix.covariance(2, 2));
+  const double of_height = share(free_steps(height_sd), std::abs(off.z()) / height_sd);
+  left.place += off.cwiseProduct(Vector3d(of_plane, of_plane, of_height));
+  if (of_plane < 1.0 && of_height < 1.0) return left;
+  left.covariance.topRightCorner<2, 1>().setZero();
+  left.covariance.bottomLeftCorner<1, 2>().setZero();
+  const double unknown = kUnknownM * kUnknownM;
+  if (of_plane == 1.0)
+    left.covariance.topLeftCorner<2, 2>() = unknown * Eigen::Matrix2d::Identity();
+  if (of_height == 1.0) left.covariance(2, 2) = unknown;
+  return left;
+}
 
 double plane_distance(const Vector3d& a, const Vector3d& b) {
   return (a - b).head<2>().norm();
@@ -76,6 +113,11 @@ void describe(ConfigTable& table, SatelliteBeliefConfig& config) {
             "standard deviation of the heading by the course, each scan");
   table.add("oldest_fix_s", config.oldest_fix_s, {0.01, 60.0}, "s",
             "an older position says nothing of a scan");
+  table.add("free_sd", config.free_sd, {0.0, 10.0}, "",
+            "penalty: a position pulls back to within so many times what its standard deviation "
+            "is above followed_sd_m; 0: to where it is");
+  table.add("followed_sd_m", config.followed_sd_m, {0.0, 100.0}, "m",
+            "penalty: positions up to this standard deviation pull to where they are");
 }
 
 SatelliteBelief::SatelliteBelief(const SatelliteBeliefConfig& config, double tilt_sd_deg)
@@ -94,6 +136,7 @@ void SatelliteBelief::add_fix(const GnssFix& fix, const Vector3d& antenna_in_bod
                               const std::optional<Vector3d>& second_in_body) {
   if (!has_position(fix)) return;
   antenna_in_body_ = antenna_in_body;
+  second_in_body_ = second_in_body;
   if (first_) first_->add_fix(fix, antenna_in_body, second_in_body);
   if (aligned()) waiting_.push_back(fix);
 }
@@ -150,8 +193,23 @@ void SatelliteBelief::take_fixes(const StampedPose& pose) {
     fixes_.push_back({fix.stamp, world_from_enu * EastNorthUp(origin_).from_place(place),
                       turned(world_from_enu, covariance), body});
     fixes_.back().distrust = distrust_of(fixes_.back());
+    note_heading(fix, fixes_.back());
     forget_fixes();
   }
+}
+
+// What the second antenna says against the map is no drift beyond some degrees: then they are
+// swapped, or their places are wrong.
+void SatelliteBelief::note_heading(const GnssFix& fix, FixOnPath& on_path) const {
+  if (!second_in_body_ || !std::isfinite(fix.heading_deg)) return;
+  const Vector3d baseline =
+      on_path.world_from_body.rotation() * (*second_in_body_ - antenna_in_body_);
+  const double sd = std::hypot(turn_sd_rad(fix, kHeadingSdDeg), kBaselineSdDeg * kDegree);
+  const double turn = std::remainder(
+      turn_by_heading(fix, baseline) + turn_about_up(world_from_enu_->rotation()), 2.0 * M_PI);
+  if (!(std::abs(turn) <= kMostTurnDeg * kDegree + kFarSteps * sd)) return;
+  on_path.turn_rad = turn;
+  on_path.turn_sd_rad = sd;
 }
 
 // One fix that lies the course's way back is enough.
@@ -185,7 +243,7 @@ std::optional<PoseBelief> SatelliteBelief::at(const StampedPose& predicted,
                                               const Eigen::Quaterniond& level_from_world) const {
   if (!aligned() || fixes_.empty()) return std::nullopt;
   const FixOnPath& newest = fixes_.back();
-  if (to_seconds(predicted.stamp - newest.stamp) > config_.oldest_fix_s) return std::nullopt;
+  if (is_old(newest, predicted.stamp)) return std::nullopt;
   const Vector3d moved =
       predicted.world_from_body * antenna_in_body_ - newest.world_from_body * antenna_in_body_;
   // The prior leaves gravity to the smoother, which knows it already.
@@ -194,25 +252,65 @@ std::optional<PoseBelief> SatelliteBelief::at(const StampedPose& predicted,
   Vector3d attitude_sd(tilt_sd, tilt_sd, kUnknownRad);
   Eigen::Quaterniond rotation = predicted.world_from_body.rotation();
   if (penalty) rotation = level_from_world * rotation;
-  if (const std::optional<double> error = heading_error(newest, predicted)) {
+  if (std::isfinite(newest.turn_rad)) {
+    rotation = Eigen::AngleAxisd(newest.turn_rad, Vector3d::UnitZ()) * rotation;
+    attitude_sd.z() = newest.turn_sd_rad;
+  } else if (const std::optional<double> error = heading_error(newest, predicted)) {
     rotation = Eigen::AngleAxisd(*error, Vector3d::UnitZ()) * rotation;
     attitude_sd.z() = config_.course_sd_deg * kDegree * newest.distrust;
   }
+  AntennaBelief antenna{newest.fix_in_world + moved,
+                        std::pow(newest.distrust, 2.0) * newest.covariance};
+  const Vector3d by_odometry = predicted.world_from_body * antenna_in_body_;
+  if (penalty) antenna = beyond_free(antenna, by_odometry, config_);
+  if (antenna.covariance.diagonal().minCoeff() >= kUnknownM * kUnknownM) return std::nullopt;
   PoseBelief belief;
-  const Vector3d antenna = newest.fix_in_world + moved;
-  belief.target_from_source = Pose(rotation, antenna - rotation * antenna_in_body_);
+  belief.target_from_source = Pose(rotation, antenna.place - rotation * antenna_in_body_);
   belief.point_in_source = antenna_in_body_;
-  belief.position_covariance = std::pow(newest.distrust, 2.0) * newest.covariance;
+  belief.position_covariance = antenna.covariance;
   belief.attitude_covariance = attitude_sd.cwiseAbs2().asDiagonal();
   if (penalty && config_.place == PenaltyPlace::kCentre && has_centre_) {
-    // The belief there, as far as a turn within its attitude goes.
-    const Vector3d arm = rotation * (centre_in_body_ - antenna_in_body_);
-    const Vector3d known_sd = attitude_sd.cwiseMin(config_.course_sd_deg * kDegree);
+    // The centre is as far off as the antenna is, but for a turn of the map. The course knows the
+    // heading worse than the map does: a sleigh slips by degrees.
+    const Vector3d centre = predicted.world_from_body * centre_in_body_;
+    const Vector3d arm = centre - by_odometry;
+    const Vector3d turn_sd =
+        kDegree * Vector3d(config_.gravity_sd_deg, config_.gravity_sd_deg, kMapHeadingDeg);
     belief.point_in_source = centre_in_body_;
+    belief.target_from_source =
+        Pose(rotation, centre + antenna.place - by_odometry - rotation * centre_in_body_);
     belief.position_covariance +=
-        skew(arm) * known_sd.cwiseAbs2().asDiagonal() * skew(arm).transpose();
+        skew(arm) * turn_sd.cwiseAbs2().asDiagonal() * skew(arm).transpose();
   }
   return belief;
+}
+
+bool SatelliteBelief::is_old(const FixOnPath& fix, TimeNs now) const {
+  return to_seconds(now - fix.stamp) > config_.oldest_fix_s;
+}
+
+std::optional<PoseBelief> SatelliteBelief::heading_at(const StampedPose& predicted) const {
+  if (config_.use != SatellitesInMatch::kPenalty || !aligned() || fixes_.empty())
+    return std::nullopt;
+  const FixOnPath& newest = fixes_.back();
+  if (is_old(newest, predicted.stamp) || !std::isfinite(newest.turn_rad)) return std::nullopt;
+  PoseBelief belief;
+  belief.target_from_source = Pose(
+      Eigen::AngleAxisd(newest.turn_rad, Vector3d::UnitZ()) * predicted.world_from_body.rotation(),
+      predicted.world_from_body.translation());
+  belief.attitude_covariance =
+      Vector3d(kUnknownRad, kUnknownRad, newest.turn_sd_rad).cwiseAbs2().asDiagonal();
+  belief.least_arm_m = kFarArmM;
+  return belief;
+}
+
+bool SatelliteBelief::holds() const {
+  if (!aligned() || fixes_.empty() || !last_) return false;
+  const FixOnPath& newest = fixes_.back();
+  if (is_old(newest, last_->stamp)) return false;
+  const Vector3d off = newest.world_from_body * antenna_in_body_ - newest.fix_in_world;
+  const double sd = newest.distrust * std::sqrt(newest.covariance.diagonal().maxCoeff());
+  return sd <= kHeldSdM && off.norm() <= kHeldM;
 }
 
 void SatelliteBelief::note_match(const Matrix6d& information) {
@@ -246,6 +344,7 @@ void SatelliteBelief::level_world(const Pose& new_world_from_old_world) {
       fix.fix_in_world = new_from_old * fix.fix_in_world;
       fix.covariance = turned(new_from_old, fix.covariance);
     }
+    turn_headings(new_from_old, 1.0);
   }
   move_present(new_world_from_old_world);
 }
@@ -259,6 +358,13 @@ void SatelliteBelief::move_present(const Pose& new_world_from_old_world) {
   if (course_from_) move(*course_from_);
   for (FixOnPath& fix : fixes_)
     move(fix);
+  turn_headings(new_world_from_old_world, -1.0);
+}
+
+// What the bodies' headings lack, where east, north, up (1) or the bodies (-1) were turned.
+void SatelliteBelief::turn_headings(const Pose& new_from_old, double sign) {
+  for (FixOnPath& fix : fixes_)
+    fix.turn_rad += sign * turn_about_up(new_from_old.rotation());
 }
 
 void SatelliteBelief::begin_piece() {
@@ -274,6 +380,8 @@ void SatelliteBelief::save(BinaryWriter& writer) const {
   writer.put(first_.has_value());
   if (first_) first_->save(writer);
   writer.put_doubles(antenna_in_body_.data(), 3);
+  put_optional(writer, second_in_body_,
+               [](BinaryWriter& to, const Vector3d& place) { to.put_doubles(place.data(), 3); });
   put_optional(writer, last_, put_stamped_pose);
   writer.put_doubles(centre_in_body_.data(), 3);
   writer.put(has_centre_);
@@ -293,6 +401,8 @@ void SatelliteBelief::save(BinaryWriter& writer) const {
     writer.put_doubles(fix.covariance.data(), 9);
     put_pose(writer, fix.world_from_body);
     writer.put(fix.distrust);
+    writer.put(fix.turn_rad);
+    writer.put(fix.turn_sd_rad);
   }
 }
 
@@ -300,6 +410,11 @@ void SatelliteBelief::load(BinaryReader& reader) {
   begin_stretch();
   reader.get<bool>() ? first_->load(reader) : first_.reset();
   reader.get_doubles(antenna_in_body_.data(), 3);
+  second_in_body_ = get_optional(reader, [](BinaryReader& from) {
+    Vector3d place;
+    from.get_doubles(place.data(), 3);
+    return place;
+  });
   last_ = get_optional(reader, get_stamped_pose);
   reader.get_doubles(centre_in_body_.data(), 3);
   has_centre_ = reader.get<bool>();
@@ -320,6 +435,8 @@ void SatelliteBelief::load(BinaryReader& reader) {
     reader.get_doubles(fix.covariance.data(), 9);
     fix.world_from_body = get_pose(reader);
     fix.distrust = reader.get<double>();
+    fix.turn_rad = reader.get<double>();
+    fix.turn_sd_rad = reader.get<double>();
     fixes_.push_back(fix);
   }
 }

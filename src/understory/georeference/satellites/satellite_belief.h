@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <optional>
 
 #include "understory/geometry/stamped_pose.h"
@@ -47,6 +48,12 @@ struct SatelliteBeliefConfig {
   double course_way_m = 3.0;
   double course_sd_deg = 10.0;
   double oldest_fix_s = 1.0;  // an older fix says nothing of a scan
+  // Penalty: the error of a receiver stays for minutes. A fix with a standard deviation up to
+  // `followed_sd_m` pulls to where it is: the odometry drifts about as much meanwhile. A worse one
+  // only says that the antenna is within some distance of it, and pulls back to there. That is
+  // `free_sd` times what the deviation is above `followed_sd_m`, in the plane and in height.
+  double free_sd = 3.0;
+  double followed_sd_m = 0.05;
   FixCovarianceConfig covariance;
 };
 void describe(ConfigTable& table, SatelliteBeliefConfig& config);
@@ -55,9 +62,10 @@ void describe(ConfigTable& table, SatelliteBeliefConfig& config);
 // match, P3 sections 3.2, 3.3 and 5.1. The path of the first stretch lays the world frame on east,
 // north, up; from then on it stays there. Position: the newest fix, carried on by the odometry; a
 // fix that leaves the way of the odometry counts less. Heading, while the carrier moves: the course
-// by the fixes, against the body's course in the first stretch. While it stands, none. Gravity: the
-// IMU's. So nothing of it depends on how the map has drifted. Takes the poses in order of time, and
-// the fixes up to each before it. Deterministic; not thread-safe.
+// by the fixes, against the body's course in the first stretch. While it stands, none. A second
+// antenna tells it better, and always. Gravity: the IMU's. So nothing of it depends on how the map
+// has drifted. Takes the poses in order of time, and the fixes up to each before it. Deterministic;
+// not thread-safe.
 class SatelliteBelief {
  public:
   // `tilt_sd_deg`: how far the world's up may be off, see tilt_sd_deg() of split_fit.h.
@@ -80,6 +88,8 @@ class SatelliteBelief {
 
   // Whether the first stretch is over.
   [[nodiscard]] bool aligned() const { return world_from_enu_.has_value(); }
+  // Whether the last pose lies where a good fix says: its place does not drift.
+  [[nodiscard]] bool holds() const;
   // When it ended first; 0: it did not.
   [[nodiscard]] TimeNs aligned_at() const { return aligned_at_; }
   // What is believed of the body at a scan, whose pose by the odometry is `predicted`, world frame.
@@ -89,12 +99,17 @@ class SatelliteBelief {
   [[nodiscard]] std::optional<PoseBelief> at(
       const StampedPose& predicted,
       const Eigen::Quaterniond& level_from_world = Eigen::Quaterniond::Identity()) const;
+  // Of a penalty: the heading by the second antenna alone, for a term of its own; it counts while
+  // the carrier stands, too. Its points lie far away, so that where the antenna is counts nothing.
+  // Nothing where at() says nothing of the kind, and where the two antennas contradict the map.
+  [[nodiscard]] std::optional<PoseBelief> heading_at(const StampedPose& predicted) const;
 
   // The whole state, bit for bit. `load` into one with the same configuration.
   void save(BinaryWriter& writer) const;
   void load(BinaryReader& reader);
 
  private:
+  static constexpr double kNoTurn = std::numeric_limits<double>::quiet_NaN();
   // A fix beside the path.
   struct FixOnPath {
     TimeNs stamp = 0;
@@ -102,6 +117,10 @@ class SatelliteBelief {
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // world axes, m^2
     Pose world_from_body;                                      // at the stamp, by the path
     double distrust = 1.0;  // by which its standard deviation grows
+    // By the second antenna: the turn about up that the body's heading lacks, with its standard
+    // deviation, rad. NaN: it says nothing.
+    double turn_rad = kNoTurn;
+    double turn_sd_rad = kNoTurn;
   };
 
   void begin_stretch();
@@ -110,6 +129,9 @@ class SatelliteBelief {
   void take_fixes(const StampedPose& pose);
   void forget_fixes();
   [[nodiscard]] double distrust_of(const FixOnPath& fix) const;
+  void note_heading(const GnssFix& fix, FixOnPath& on_path) const;
+  void turn_headings(const Pose& new_from_old, double sign);
+  [[nodiscard]] bool is_old(const FixOnPath& fix, TimeNs now) const;
   [[nodiscard]] std::optional<double> heading_error(const FixOnPath& newest,
                                                     const StampedPose& predicted) const;
 
@@ -117,6 +139,7 @@ class SatelliteBelief {
   double tilt_sd_deg_;
   std::optional<OnlineGeoreference> first_;  // over the first stretch, where a path drifts little
   Eigen::Vector3d antenna_in_body_ = Eigen::Vector3d::Zero();  // of the last fix
+  std::optional<Eigen::Vector3d> second_in_body_;              // the same, if it is known
   std::optional<StampedPose> last_;
   Eigen::Vector3d centre_in_body_ = Eigen::Vector3d::Zero();  // of turning
   bool has_centre_ = false;

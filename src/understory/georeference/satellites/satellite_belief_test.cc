@@ -46,7 +46,7 @@ class Sleigh {
   }
   void step() {
     const double time_s = 0.1 * steps_;
-    if (steps_ % 2 == 0) belief_.add_fix(fix_at(time_s - early_s_), kArm);
+    if (steps_ % 2 == 0) belief_.add_fix(fix_at(time_s - early_s_), kArm, told_second_);
     const Pose truth = true_body(time_s);
     const Pose moved = steps_ > 0 ? true_body(time_s - 0.1).inverse() * truth : Pose();
     const double metres = moved.translation().norm();
@@ -58,6 +58,11 @@ class Sleigh {
   }
   // Fixes come so long before the scans.
   void set_early(double early_s) { early_s_ = early_s; }
+  // A second antenna, and where it is said to be.
+  void set_second(const Vector3d& in_body, const Vector3d& told) {
+    second_ = in_body;
+    told_second_ = told;
+  }
   void jump(const Vector3d& metres) { jump_ = metres; }
   void stand() { stands_from_s_ = 0.1 * steps_; }
   void move(const Pose& motion, bool level) {
@@ -88,6 +93,12 @@ class Sleigh {
     fix.height_m = place.height_m;
     fix.covariance = kStatedVariance / 3.0 * Eigen::Matrix3d::Identity();
     fix.quality = 4;
+    if (!second_) return fix;
+    const Vector3d line =
+        kEnuFromWorld.rotation() * (true_body(time_s).rotation() * (*second_ - kArm));
+    fix.heading_deg = std::remainder(std::atan2(line.x(), line.y()) / kDegree, 360.0);
+    if (fix.heading_deg < 0.0) fix.heading_deg += 360.0;
+    fix.heading_sd_deg = 0.2;
     return fix;
   }
 
@@ -96,6 +107,8 @@ class Sleigh {
   double drift_deg_;
   double from_s_;
   double early_s_ = 0.0;
+  std::optional<Vector3d> second_;
+  std::optional<Vector3d> told_second_;
   double stands_from_s_ = 1e9;
   Vector3d jump_ = Vector3d::Zero();
   Pose odometry_;
@@ -107,6 +120,7 @@ SatelliteBeliefConfig with(SatellitesInMatch use) {
   SatelliteBeliefConfig config;
   config.use = use;
   config.first_heading_sd_deg = 0.1;
+  config.free_sd = 0.0;
   return config;
 }
 
@@ -195,6 +209,113 @@ TEST(SatelliteBelief, GravityIsTheImus) {
   EXPECT_LT((belief->target_from_source * kArm - sleigh.belief()->target_from_source * kArm).norm(),
             1e-9)
       << "the antenna stays at the fix";
+}
+
+// A receiver's error stays for minutes: what it explains is no drift.
+TEST(SatelliteBelief, AFixSaysNothingOfWhatItsOwnErrorExplains) {
+  SatelliteBeliefConfig config = with(SatellitesInMatch::kPenalty);
+  Sleigh to_the_fix(config);
+  config.free_sd = 18.0;
+  const double sd = std::sqrt(kStatedVariance / 3.0 + 0.01 * 0.01);
+  config.followed_sd_m = sd / 3.0;  // free are 12 standard deviations
+  Sleigh sleigh(config);
+  for (Sleigh* each : {&to_the_fix, &sleigh})
+    each->until(60.0);
+  ASSERT_TRUE(sleigh.filter().aligned());
+  EXPECT_FALSE(sleigh.belief().has_value());
+  const Vector3d fix = to_the_fix.belief()->target_from_source * kArm;
+  // A loop moves the path off the fixes.
+  sleigh.move(Pose(Eigen::Quaterniond::Identity(), Vector3d(4.0, 0.0, 0.0)), false);
+  const auto ahead = sleigh.belief();
+  ASSERT_TRUE(ahead.has_value());
+  const Vector3d left = ahead->target_from_source * kArm - fix;
+  EXPECT_NEAR(left.head<2>().norm(), 12.0 * sd, 1e-6) << "the edge of what it allows";
+  EXPECT_LT(ahead->position_covariance(0, 0), 0.1);
+  EXPECT_GT(ahead->position_covariance(2, 2), 1e5) << "of the height it says nothing";
+  config.followed_sd_m = 2.0 * sd;
+  Sleigh good(config);
+  good.until(60.0);
+  EXPECT_LT((good.belief()->target_from_source * kArm - fix).norm(), 1e-9) << "it is followed";
+  sleigh.move(Pose(Eigen::Quaterniond::Identity(), Vector3d(-4.0, 0.0, 1.0)), false);
+  const auto above = sleigh.belief();
+  ASSERT_TRUE(above.has_value());
+  EXPECT_GT(above->position_covariance(0, 0), 1e5) << "nor of the plane";
+  EXPECT_LT(above->position_covariance(2, 2), 0.1);
+}
+
+// A sleigh slips: its course is degrees off the way it looks. That must not move the place where
+// the position pulls, metres ahead of the antenna.
+TEST(SatelliteBelief, TheCentreOfTurningIsAsFarOffAsTheAntenna) {
+  Sleigh sleigh(with(SatellitesInMatch::kPenalty));
+  sleigh.until(60.0);
+  const Vector3d centre(8.0, 0.0, 0.5);
+  Matrix6d information = 1e4 * Matrix6d::Identity();
+  information.topRightCorner<3, 3>() = 1e4 * skew(centre);
+  information.bottomLeftCorner<3, 3>() = 1e4 * skew(centre).transpose();
+  sleigh.filter().note_match(information);
+  const Pose here = sleigh.world_from_body();
+  const Eigen::Quaterniond slipped = so3_exp(Vector3d(0.0, 0.0, 6.0 * kDegree)) * here.rotation();
+  const Pose predicted(slipped, here * kArm - slipped * kArm);
+  const auto belief = sleigh.filter().at({stamp(60.0), predicted});
+  ASSERT_TRUE(belief.has_value());
+  EXPECT_LT((belief->point_in_source - centre).norm(), 1e-6);
+  EXPECT_LT(heading_difference(belief->target_from_source, predicted), -2.0 * kDegree)
+      << "the course says so";
+  EXPECT_LT((belief->target_from_source * centre - predicted * centre).norm(), 0.15);
+  EXPECT_LT(belief->position_covariance.topLeftCorner(2, 2).trace(), 0.02);
+}
+
+// P3 section 5.2 has a carrier that stands without a heading; two antennas have one.
+TEST(SatelliteBelief, ASecondAntennaTellsTheHeadingOfACarrierThatStands) {
+  const Vector3d second(0.9, -0.5, 1.4);
+  Sleigh sleigh(with(SatellitesInMatch::kPenalty), 1.0, 60.0);
+  sleigh.set_second(second, second);
+  sleigh.until(160.0);
+  sleigh.stand();
+  sleigh.until(190.0);
+  EXPECT_GT(heading_difference(sleigh.world_from_body(), sleigh.truth()), 1.5 * kDegree);
+  const TimeNs now = stamp(190.0);
+  const auto heading = sleigh.filter().heading_at({now, sleigh.world_from_body()});
+  ASSERT_TRUE(heading.has_value());
+  EXPECT_LT(std::abs(heading_difference(heading->target_from_source, sleigh.truth())),
+            0.4 * kDegree);
+  EXPECT_NEAR(std::sqrt(heading->attitude_covariance(2, 2)), std::hypot(0.2, 0.3) * kDegree, 1e-6);
+  EXPECT_GT(heading->attitude_covariance(0, 0), 10.0);
+  EXPECT_NEAR(sleigh.belief()->attitude_covariance(2, 2), heading->attitude_covariance(2, 2), 1e-9);
+  // A loop has turned the map by a degree: the heading is where it was.
+  const Pose turn(so3_exp(Vector3d(0.0, 0.0, 1.0 * kDegree)), Vector3d::Zero());
+  sleigh.move(turn, false);
+  const auto later = sleigh.filter().heading_at({now, sleigh.world_from_body()});
+  EXPECT_NEAR(heading_difference(later->target_from_source, heading->target_from_source), 0.0,
+              1e-6);
+  // A levelled world has turned with it.
+  sleigh.move(turn, true);
+  const auto level = sleigh.filter().heading_at({now, sleigh.world_from_body()});
+  EXPECT_NEAR(heading_difference(level->target_from_source, later->target_from_source),
+              1.0 * kDegree, 1e-3);
+}
+
+// Its places on the body are swapped: it says 180 degrees, which no map drifts.
+TEST(SatelliteBelief, AHeadingThatNoDriftExplainsDoesNotCount) {
+  const Vector3d second(0.9, -0.5, 1.4);
+  Sleigh sleigh(with(SatellitesInMatch::kPenalty));
+  sleigh.set_second(second, 2.0 * kArm - second);
+  sleigh.until(90.0);
+  ASSERT_TRUE(sleigh.filter().aligned());
+  EXPECT_FALSE(sleigh.filter().heading_at({stamp(90.0), sleigh.world_from_body()}).has_value());
+  ASSERT_TRUE(sleigh.belief().has_value());
+  EXPECT_LT(std::abs(heading_difference(sleigh.belief()->target_from_source, sleigh.truth())),
+            3.0 * kDegree);
+}
+
+// What a map may take over of a place: RTK, and the path where it says.
+TEST(SatelliteBelief, HoldsAPathThatLiesAtItsFixes) {
+  Sleigh sleigh(with(SatellitesInMatch::kPenalty), 1.0, 60.0);
+  EXPECT_FALSE(sleigh.filter().holds());
+  sleigh.until(60.0);
+  EXPECT_TRUE(sleigh.filter().holds());
+  sleigh.until(200.0);
+  EXPECT_FALSE(sleigh.filter().holds()) << "the path has drifted by metres";
 }
 
 // While it stands nothing tells its heading, P3 section 5.2.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "understory/geometry/pose_io.h"
+#include "understory/map/map_constants.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -13,6 +14,8 @@ namespace {
 
 constexpr const char* kFile = "keyframes.bin";
 constexpr std::uint64_t kPosesKept = 3;  // files of poses; two checkpoints may count on two
+// Each keyframe goes in once, and brings others back.
+constexpr std::size_t kMostInsertions = 1 + map_constants::returning_keyframes::kMostAtOnce;
 constexpr std::size_t kPoseBytes = 7 * sizeof(double);
 
 enum class Kind : std::uint8_t { kKeyframe = 1, kSegment = 2, kLoop = 3 };
@@ -213,8 +216,8 @@ std::vector<LocalMapInsertion> get_insertions(BinaryReader& reader, std::size_t 
   std::vector<LocalMapInsertion> insertions;
   for (const Run& run : reader.get_vector<Run>()) {
     if (run.keyframe >= keyframes || run.count > keyframes - run.keyframe ||
-        run.count > keyframes - insertions.size())
-      throw InputError("checkpoint", "", "expected keyframes that are there, each once");
+        run.count > kMostInsertions * keyframes - insertions.size())
+      throw InputError("checkpoint", "", "expected keyframes that are there");
     for (std::uint64_t k = 0; k < run.count; ++k) {
       const std::uint64_t keyframe = run.keyframe + k;
       insertions.push_back({keyframe, k == 0 ? run.forget : forgets(run.rule, keyframe)});

@@ -75,6 +75,7 @@ constexpr const char* kPointsFile = "keyframe_points.bin";
 
 void KeyframeMap::start() {
   keyframes_.clear();
+  returning_ = {};
   segment_starts_ = {0};
   joined_ = 0;
   inserted_.clear();
@@ -111,6 +112,7 @@ std::optional<Pose> KeyframeMap::add(TimeNs stamp, const KeyframeOffer& offer,
   keyframe.covariance = edge_covariance(keyframe.previous_from_this) + offer.covariance;
   keyframe.begins_piece = !keyframes_.empty() && keyframes_.size() == segment_start();
   keyframes_.push_back(keyframe);
+  returning_.add(offer.held);
   points_->append(stamp, points_in_body);
   if (const auto again = close_in_present()) return moved ? *again * *moved : *again;
   update_local_map(keyframes_.size() - 1);
@@ -171,10 +173,12 @@ std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
     return moved;
   }
   take_local_map(outcome);
+  returning_.note_made_anew(keyframes_, local_map_.radius_m());
   for (std::size_t i = std::max(known, segment_start()); i < keyframes_.size(); ++i) {
     insert(i);
   }
   take_snapshot();
+  giving_back_ = std::async(std::launch::async, return_freed_memory);
   return moved;
 }
 
@@ -254,6 +258,9 @@ void KeyframeMap::update_local_map(std::size_t keyframe) {
     return;
   }
   insert(keyframe);
+  for (const std::size_t back :
+       returning_.take(keyframes_, local_map_start(), local_map_.radius_m()))
+    insert(back, false);
   take_snapshot();
 }
 
@@ -264,8 +271,11 @@ void KeyframeMap::take_snapshot() {
 }
 
 void KeyframeMap::insert(std::size_t keyframe) {
+  insert(keyframe, keyframe % kForgetEvery == 0);
+}
+
+void KeyframeMap::insert(std::size_t keyframe, bool forget) {
   snapshot_.reset();  // so that the map need not copy what it forgets of
-  const bool forget = keyframe % kForgetEvery == 0;
   inserted_.push_back({keyframe, forget ? 1U : 0U});
   local_map_.insert({points_->get(keyframe).get(), keyframes_[keyframe].world_from_body}, forget);
   tell_of_radius();
@@ -302,6 +312,7 @@ void KeyframeMap::rebuild_local_map() {
     }
   } else {
     inserted_ = keyframes_within_reach(positions, first, local_map_.radius_m());
+    returning_.note_made_anew(keyframes_, local_map_.radius_m());
   }
   insert_all();
 }
@@ -393,6 +404,7 @@ void KeyframeMap::save(BinaryWriter& writer) const {
   writer.put(points_->count());
   writer.put(local_map_.first_radius_m());
   put_insertions(writer, inserted_);
+  returning_.save(writer);
   loops_.save(writer);
 }
 
@@ -411,6 +423,7 @@ void KeyframeMap::load(BinaryReader& reader) {
     throw InputError((folder_ / kPointsFile).string(), "", "expected the points of each keyframe");
   local_map_.set_radius(first_radius_m);
   inserted_ = get_insertions(reader, keyframes_.size());
+  returning_.load(reader, keyframes_.size());
   insert_all();
   loops_.load(reader, std::move(growth.loops), keyframes_, segment_starts_, *points_);
   const MapPieces known = pieces();

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "understory/map/keyframes/keyframe.h"
 #include "understory/map/keyframes/keyframe_history.h"
 #include "understory/map/keyframes/keyframe_points.h"
+#include "understory/map/keyframes/returning_keyframes.h"
 #include "understory/map/local_map.h"
 #include "understory/map/loop_closer.h"
 #include "understory/map/map_constants.h"
@@ -54,6 +56,8 @@ struct KeyframeOffer {
   Matrix6d covariance = Matrix6d::Zero();
   double found_share = 1.0;  // of what scans usually find again in the map
   double fitness_m2 = 0.0;   // of its match, mean squared distance
+  // Satellites hold its place in the world: it may come back into the map, ReturningKeyframes.
+  bool held = false;
 };
 
 // Weighted distance between two poses, P4 (37) with the right difference (Errata), metres.
@@ -151,6 +155,7 @@ class KeyframeMap {
   [[nodiscard]] std::size_t local_map_start() const;
   void update_local_map(std::size_t keyframe);
   void insert(std::size_t keyframe);
+  void insert(std::size_t keyframe, bool forget);
   void take_local_map(LoopOutcome& outcome);
   void tell_of_radius();
   void take_snapshot();
@@ -174,11 +179,14 @@ class KeyframeMap {
   LocalMap local_map_;
   std::vector<LocalMapInsertion>
       inserted_;  // since the local map was empty, in order: builds it again
+  ReturningKeyframes returning_;
   MatchTargetPtr snapshot_;
   bool takes_loops_when_found_ = false;
   bool told_of_radius_ = false;
   std::vector<char> loops_used_;
   LoopCloser loops_;
+  // Hands back what the last loop that was found has left free, beside the scan loop.
+  std::future<void> giving_back_;
 };
 
 }  // namespace understory

@@ -161,7 +161,8 @@ void DenseOdometry::clean(const Scan& scan, const std::vector<StampedPose>& path
                           DenseEstimate& estimate) {
   keep_.clear();
   if (!boxes_.empty()) keep_ = outside_machine(scan, rig_, boxes_);
-  drop_isolated(scan, config_.isolated, keep_);
+  // The weather filter judges lone returns better: beside those in the scans before.
+  if (!weather_.judges(scan)) drop_isolated(scan, config_.isolated, keep_);
   estimate.cloud = deskew(scan, rig_, path, keep_, config_.deskew).cloud;
   BodyCloud& cloud = estimate.cloud;
   cloud.carried = carried_.mark(scan);

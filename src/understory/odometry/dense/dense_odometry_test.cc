@@ -303,5 +303,30 @@ TEST_F(LookingAround, WhatGoesAlongIsNotMatched) {
   }
 }
 
+// A bright return that stands alone is no weather, and the weather filter is the one to judge it.
+// Without it, or without intensities, the filter of lone returns does.
+TEST(LoneReturns, AreJudgedByTheWeatherFilterWhereItCan) {
+  Scan turn;
+  turn.stamp = TestCarrier::stamp(0.0);
+  turn.ring_count = 2;
+  for (int i = 0; i < 200; ++i) {
+    turn.points.push_back({3.0F, -2.0F + 0.02F * static_cast<float>(i), 0.0F, 100.0F,
+                           static_cast<std::uint32_t>(i) * 1000U, 0, 0, 0});
+  }
+  turn.points[100].x = 1.5F;
+  const auto left = [&](bool enabled, float of_another) {
+    turn.points[50].intensity = of_another;
+    DenseOdometryConfig config;
+    config.weather.enabled = enabled;
+    StageTimes times;
+    Log log;
+    DenseOdometry odometry(config, Rig(), nullptr, times, log);
+    return odometry.process(turn, nullptr).cloud.size();
+  };
+  EXPECT_EQ(left(false, 90.0F), 199U);
+  EXPECT_EQ(left(true, 90.0F), 200U);
+  EXPECT_EQ(left(true, 100.0F), 199U) << "no intensities";
+}
+
 }  // namespace
 }  // namespace understory

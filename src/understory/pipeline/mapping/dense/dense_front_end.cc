@@ -384,7 +384,7 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
   if (!good && estimate.thinned.size() >= kFewPoints) ++received_.counts.lost_in_a_row;
   if (good) recovery_.note_good(estimate);
   const KeyframeOffer offer = {state.world_from_body, state.pose_covariance, estimate.found_share,
-                               estimate.match.fitness_m2};
+                               estimate.match.fitness_m2, satellites_ && satellites_->holds()};
   const bool wanted = good && map_->wants(offer);
   // Positions are kept relative to the last keyframe, so that whatever moves keyframes later (loop
   // closure, levelling) moves the scans with them.

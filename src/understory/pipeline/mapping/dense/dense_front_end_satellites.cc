@@ -42,9 +42,10 @@ ScanKnowledge DenseFrontEnd::knowledge_of(const Scan& scan) {
   if (!satellites_) return {};
   const MotionModel& motion = odometry_->motion();
   const Pose predicted = motion.predict(scan.stamp).world_from_body;
-  const std::optional<PoseBelief> belief =
-      satellites_->at({scan.stamp, predicted}, motion.level_from_world());
-  if (!belief) return {};
+  const StampedPose there{scan.stamp, predicted};
+  const std::optional<PoseBelief> belief = satellites_->at(there, motion.level_from_world());
+  const std::optional<PoseBelief> heading = satellites_->heading_at(there);
+  if (!belief && !heading) return {};
   const SatelliteBeliefConfig& config = config_.satellites;
   const bool prior = config.use == SatellitesInMatch::kPrior;
   if (prior && !odometry_->uses_imu()) {
@@ -54,7 +55,11 @@ ScanKnowledge DenseFrontEnd::knowledge_of(const Scan& scan) {
   }
   ++received_.counts.by_satellites;
   if (prior) return {{}, factor_of(*belief)};
-  return {{penalty_term(*belief, config.form, config.arm_m, config.scale)}, std::nullopt};
+  ScanKnowledge known;
+  for (const std::optional<PoseBelief>& one : {belief, heading}) {
+    if (one) known.terms.push_back(penalty_term(*one, config.form, config.arm_m, config.scale));
+  }
+  return known;
 }
 
 std::vector<PositionedScan> DenseFrontEnd::finish(const Rig& /*rig*/) {
