@@ -72,7 +72,7 @@ def under_trees(folder):
 
 @cases.case("a second antenna is a prior of the heading in the match")
 def second_antenna(folder):
-    plain, other = mapped(RTK, folder / "plain", *WAYS["penalty"]), mapped(TWO_ANTENNAS, folder / "two", *WAYS["penalty"])
+    plain, other = TOLD["penalty"], mapped(TWO_ANTENNAS, folder / "two", *WAYS["penalty"])
     # The first stretch ends sooner, since its heading is known while the sleigh stands.
     assert other["quality"]["gnss_match_from_s"] <= plain["quality"]["gnss_match_from_s"], (plain, other)
     found = errors(TWO_ANTENNAS, folder / "two")
