@@ -24,9 +24,9 @@ inline constexpr double kPoleCosine = 0.7;
 // Length of the mean of unit rays: longer, a cell was seen from one side only [chosen; measured
 // on harvester seeds 3 and 11, docs/method/registration.md]
 inline constexpr double kOneSide = 0.9;
-// Sine of the angle between a surface and the rays: smaller, the rays lie in it [chosen; measured
-// on harvester seeds 3 and 11, docs/method/registration.md]
-inline constexpr double kGrazing = 0.1;
+// Sine of the angle between a surface and the rays: smaller, the rays lie in it [tuned on swing and
+// hover 1 to 19 and 51 to 60, 0.1 to 0.2 tried, docs/method/odometry.md]
+inline constexpr double kGrazing = 0.15;
 // Variance of a surface's second axis over that of a full cell. Below it the surface is a strip,
 // and its surroundings tell its slope across [chosen]
 inline constexpr double kStripShare = 0.5;

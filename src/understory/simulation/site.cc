@@ -226,6 +226,10 @@ void check_site(const SiteConfig& site) {
   if (site.carrier.strip_road > site.carrier.strip_roads) {
     problems.push_back("carrier: strip_road is larger than strip_roads");
   }
+  const std::vector<double>& silent = site.gnss.silent_s;
+  if (!silent.empty() && (silent.size() != 2 || silent[0] > silent[1])) {
+    problems.push_back("gnss.silent_s: expected [] or two times, the first no later");
+  }
   if (site.carrier.narrow_from > site.carrier.narrow_to) {
     problems.push_back("carrier: narrow_from is larger than narrow_to");
   }

@@ -250,6 +250,8 @@ struct GnssConfig {
   double reported_factor = 0.5;     // reported over true standard deviation: overconfident
   double outage_interval_s = 70.0;  // mean time between outages under closed canopy
   double outage_s = 4.0;
+  // From, to: no fixes between these seconds of the recording. Empty: none are left out.
+  std::vector<double> silent_s = {};
   double burst_interval_s = 0.0;  // mean time between bursts under closed canopy, 0 = none
   double burst_s = 25.0;          // length of a burst
   double burst_m = 4.0;           // its height in the plane

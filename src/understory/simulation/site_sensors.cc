@@ -149,6 +149,8 @@ void describe_gnss(ConfigTable& table, GnssConfig& c) {
     table.add("outage_interval_s", c.outage_interval_s, {1.0, 1e9}, "s",
               "mean time between outages under closed canopy");
     table.add("outage_s", c.outage_s, {0.0, 1e6}, "s", "mean length of an outage");
+    table.add("silent_s", c.silent_s, "s",
+              "[from, to]: no fixes between these times of the recording; []: never");
     table.add("burst_interval_s", c.burst_interval_s, {0.0, 1e9}, "s",
               "mean time between bursts of error under closed canopy, 0 = none");
     table.add("burst_s", c.burst_s, {0.1, 1e6}, "s", "length of a burst");

@@ -1,5 +1,8 @@
 #include "understory/odometry/imu/preintegration.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "understory/util/error.h"
 
 namespace understory {
@@ -12,6 +15,23 @@ struct Step {
   Eigen::Vector3d force_begin;  // in the frame of the IMU at its own time
   Eigen::Vector3d force_end;
 };
+
+// The white noise of the accelerometer as its own samples show it, (m/s^2)^2/Hz, mean of the axes.
+// It is that of second differences, in which the motion of a carrier is next to nothing. Where an
+// engine or rotors shake the sensor faster than it samples, what they add looks like noise.
+double shown_accel_noise(const std::vector<InertialSample>& samples) {
+  if (samples.size() < 3) return 0.0;
+  double squares = 0.0;
+  for (std::size_t i = 2; i < samples.size(); ++i) {
+    squares += (samples[i - 2].specific_force() - 2.0 * samples[i - 1].specific_force() +
+                samples[i].specific_force())
+                   .squaredNorm();
+  }
+  // Of white noise the second difference has six times the variance.
+  const double variance = squares / (18.0 * static_cast<double>(samples.size() - 2));
+  const double duration = to_seconds(samples.back().stamp - samples.front().stamp);
+  return variance * duration / static_cast<double>(samples.size() - 1);
+}
 
 void advance(Preintegration& sum, const Step& step, const ImuNoiseConfig& noise) {
   const double dt = step.dt;
@@ -64,6 +84,9 @@ Preintegration preintegrate(const std::vector<InertialSample>& samples,
   Preintegration sum;
   sum.gyro_bias = gyro_bias;
   sum.accel_bias = accel_bias;
+  ImuNoiseConfig shown = noise;
+  shown.accel_noise_m_s2_sqrt_hz =
+      std::max(noise.accel_noise_m_s2_sqrt_hz, std::sqrt(shown_accel_noise(samples)));
   for (std::size_t i = 1; i < samples.size(); ++i) {
     const InertialSample& a = samples[i - 1];
     const InertialSample& b = samples[i];
@@ -71,7 +94,7 @@ Preintegration preintegrate(const std::vector<InertialSample>& samples,
     advance(sum,
             {to_seconds(b.stamp - a.stamp), 0.5 * (a.angular_rate() + b.angular_rate()) - gyro_bias,
              a.specific_force() - accel_bias, b.specific_force() - accel_bias},
-            noise);
+            shown);
   }
   sum.covariance = 0.5 * (sum.covariance + sum.covariance.transpose()).eval();
   // Interpolation between samples is not exact: a floor of 0.001 deg, 1 mm/s and 0.1 mm keeps the

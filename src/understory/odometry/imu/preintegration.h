@@ -37,7 +37,7 @@ struct Preintegration {
 };
 
 // The samples' first and last stamps are the ends of the interval; at least two samples. Noise as
-// in `noise`.
+// in `noise`; that of the accelerometer is larger where the samples themselves show more.
 [[nodiscard]] Preintegration preintegrate(const std::vector<InertialSample>& samples,
                                           const Eigen::Vector3d& gyro_bias,
                                           const Eigen::Vector3d& accel_bias,

@@ -175,5 +175,24 @@ TEST(Preintegration, CovarianceIsThatOfRepeatedNoise) {
     EXPECT_NEAR(std::sqrt(sum[i] / base.covariance(i, i)), 1.0, 0.08) << i;
 }
 
+// Rotors shake the sensor faster than it samples: what they add counts as noise. A motion does not.
+TEST(Preintegration, AccelerometerThatIsShakenIsLessSure) {
+  TestCarrier carrier(clean());
+  const ImuNoiseConfig noise;
+  const auto still = samples_of(carrier, 1.0, 1.5, 200.0);
+  const auto sure = preintegrate(still, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), noise);
+  auto samples = still;
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    samples[i].accel[0] += i % 2 == 0 ? 1.0 : -1.0;
+  const auto shaken =
+      preintegrate(samples, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), noise);
+  // Second differences of 4: a variance of 16 / 18 a sample, over 200 samples a second.
+  const double expected = std::sqrt(16.0 / 18.0 / 200.0) / noise.accel_noise_m_s2_sqrt_hz;
+  EXPECT_NEAR(std::sqrt(shaken.covariance(3, 3) / sure.covariance(3, 3)), expected, 0.1 * expected);
+  // The carrier of the test moves all the time, and its noise is that of the setting.
+  const double sigma = std::sqrt(sure.covariance(3, 3) / 0.5);
+  EXPECT_NEAR(sigma, noise.accel_noise_m_s2_sqrt_hz, 0.1 * noise.accel_noise_m_s2_sqrt_hz);
+}
+
 }  // namespace
 }  // namespace understory

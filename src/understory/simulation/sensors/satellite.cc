@@ -96,6 +96,12 @@ bool SatelliteReceiver::in_outage(double dt_s, CounterNoise& noise) {
   return outage_left_s_ > 0.0;
 }
 
+bool SatelliteReceiver::is_silent(TimeNs stamp) const {
+  const std::vector<double>& silent = config_.silent_s;
+  const double time_s = to_seconds(stamp - start_);
+  return !silent.empty() && time_s >= silent[0] && time_s < silent[1];
+}
+
 // A burst: the solution runs away to one side and comes back. The receiver does not know of it.
 Eigen::Vector3d SatelliteReceiver::burst(double dt_s) {
   if (config_.burst_interval_s <= 0.0) return Eigen::Vector3d::Zero();
@@ -149,7 +155,7 @@ std::optional<GnssFix> SatelliteReceiver::next() {
   cover_ = count_ == 0 ? cover_now : cover_ + std::min(1.0, dt / 1.5) * (cover_now - cover_);
   CounterNoise noise(seed_ + 2, static_cast<std::uint64_t>(count_), 0);
   walk(dt);
-  const bool lost = in_outage(dt, noise);
+  const bool lost = in_outage(dt, noise) || is_silent(stamp);
   jump(dt);
   walk_heading(dt);
   const Eigen::Vector3d runaway = burst(dt) + jump_;

@@ -40,6 +40,7 @@ class SatelliteReceiver {
  private:
   void walk(double dt_s);
   [[nodiscard]] bool in_outage(double dt_s, CounterNoise& noise);
+  [[nodiscard]] bool is_silent(TimeNs stamp) const;
   [[nodiscard]] Eigen::Vector3d burst(double dt_s);
   void jump(double dt_s);
 

@@ -28,6 +28,7 @@ struct Receiver {
     for (int i = 0; i < static_cast<int>(seconds * site.gnss.rate_hz); ++i) {
       const std::optional<GnssFix> fix = receiver.next();
       errors.push_back(receiver.last_error_enu());
+      fixes += fix ? 1 : 0;
       if (fix) promised_m = std::sqrt(fix->covariance(0, 0));
     }
   }
@@ -40,6 +41,7 @@ struct Receiver {
   SiteConfig site;
   Route route;
   std::vector<Eigen::Vector3d> errors;
+  int fixes = 0;
   double promised_m = 0.0;  // standard deviation east that the last fix claims
 };
 
@@ -66,6 +68,17 @@ TEST(GnssRealism, BurstsRiseUnderTheCanopyAndComeBack) {
   EXPECT_GT(at_rest, 400U);
   const Receiver open(site, 0.0, 1200.0);
   EXPECT_LT(open.largest(), 1e-9);
+}
+
+TEST(GnssRealism, FixesAreLeftOutBetweenTheTimesThatAreTold) {
+  SiteConfig site = quiet_receiver();
+  const Receiver all(site, 0.0, 60.0);
+  site.gnss.silent_s = {20.0, 30.0};
+  const Receiver cut(site, 0.0, 60.0);
+  EXPECT_EQ(all.fixes, 60);
+  EXPECT_EQ(cut.fixes, 50);
+  EXPECT_EQ(all.errors, cut.errors);  // all others are as they were
+  EXPECT_THROW(load_site("demo", {"gnss.silent_s=[30,20]"}), ConfigError);
 }
 
 TEST(GnssRealism, JumpsStepAsideAndStay) {
