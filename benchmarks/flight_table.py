@@ -65,7 +65,7 @@ def on_globe(run, truth, told):
 
 def recorded(work, site, seed, seconds, cut):
     """A recording with its receiver, silent for the seconds of `cut`."""
-    name = f"{site}_{seed}_{seconds:g}" + (f"_{cut[0]:g}_{cut[1]:g}" if cut else "")
+    name = f"{digest()}_{site}_{seed}_{seconds:g}" + (f"_{cut[0]:g}_{cut[1]:g}" if cut else "")
     file = work / f"{name}.mcap"
     if not file.exists():
         words = ["--duration-s", seconds] if seconds else []

@@ -70,19 +70,22 @@ def summary(rows):
     errors = np.array([r["errors"] for r in good])
     squares = [squared(r) for r in good]
     pooled = sum(s for s, _ in squares) / sum(n for _, n in squares)
-    each = [np.mean(e ** 2 / np.array([r["covariance"][k][k] for r in good])) for k, e in enumerate(errors.T)]
+    variances = np.array([np.diag(r["covariance"]) for r in good])
+    told = np.where(variances > 0, variances, np.nan)
+    errors = np.where(variances > 0, errors, np.nan)
+    each = np.nanmean(errors ** 2 / told, axis=0)
 
     def root(values):
-        return float(np.sqrt(np.mean(values ** 2)))
-    axes = np.degrees(np.sqrt(np.mean(errors[:, :3] ** 2, axis=0)))
-    place = 100 * np.sqrt(np.mean(errors[:, 3:6] ** 2, axis=0))
+        return float(np.sqrt(np.nanmean(values ** 2)))
+    axes = np.degrees(np.sqrt(np.nanmean(errors[:, :3] ** 2, axis=0)))
+    place = 100 * np.sqrt(np.nanmean(errors[:, 3:6] ** 2, axis=0))
     return (f"{len(good)} of {len(rows)} walks found all\n"
             f"rms: lateness {1000 * root(errors[:, 6]):.2f} ms; rotation "
             f"{np.degrees(root(np.linalg.norm(errors[:, :3], axis=1))):.3f} degrees as vectors, "
             f"{', '.join(f'{v:.3f}' for v in axes)} along the axes; place "
             f"{100 * root(np.linalg.norm(errors[:, 3:6], axis=1)):.2f} cm as vectors, "
             f"{', '.join(f'{v:.2f}' for v in place)} along the axes\n"
-            f"normalised squared error: {pooled:.2f} pooled over seven values; by value "
+            f"normalised squared error: {pooled:.2f} pooled over {sum(n for _, n in squares)} values; by value "
             f"{', '.join(f'{v:.2f}' for v in each)}")
 
 

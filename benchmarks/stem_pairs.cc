@@ -24,6 +24,7 @@
 #include "understory/util/log.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -31,8 +32,7 @@ namespace {
 constexpr std::size_t kStems = 130;
 
 StemView best_of(StemView view) {
-  std::stable_sort(view.stems.begin(), view.stems.end(),
-                   [](const Stem& a, const Stem& b) { return a.score > b.score; });
+  sort_stably(view.stems, [](const Stem& a, const Stem& b) { return a.score > b.score; });
   view.stems.resize(std::min(view.stems.size(), kStems));
   return view;
 }

@@ -75,6 +75,12 @@ class CheckFunctions(unittest.TestCase):
             "// {\n/* } */ void f() {\n  g(\"}\", '}', R\"(}\")\", 1'000);\n}\n"
             "#define X { \\\n  {\nvoid h() {}\n"), [("f", 3, 0), ("h", 1, 0)])
 
+    def test_a_call_that_another_function_replaces_is_an_error_but_in_its_home_and_in_comments(self):
+        call = "// std::stable_sort(a)\nvoid f() {\n  std::stable_sort(a.begin(), a.end());\n}\n"
+        self.assertEqual(len(findings(call)), 1)
+        self.assertTrue(findings(call)[0].startswith("src/understory/a/one.cc:3: std::stable_sort: "))
+        self.assertEqual(findings(call, "util/stable_sort.h"), [])
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -18,6 +18,7 @@
 #include "understory/registration/icp/icp_map.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
+#include "understory/util/stable_sort.h"
 #include "understory/util/timing.h"
 
 namespace {
@@ -56,8 +57,7 @@ std::vector<Eigen::Vector2d> tiles_of_disc() {
       if (tile.norm() <= kRadiusM) tiles.push_back(tile);
     }
   }
-  std::stable_sort(tiles.begin(), tiles.end(),
-                   [](const auto& a, const auto& b) { return a.norm() < b.norm(); });
+  sort_stably(tiles, [](const auto& a, const auto& b) { return a.norm() < b.norm(); });
   return tiles;
 }
 

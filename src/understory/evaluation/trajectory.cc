@@ -9,6 +9,7 @@
 #include "understory/evaluation/world_frame.h"
 #include "understory/util/error.h"
 #include "understory/util/files/csv.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -50,8 +51,7 @@ StampedPose parse_pose(const std::vector<std::string_view>& cells, const LineRea
 
 template <typename Stamped>
 void sort_by_time(std::vector<Stamped>& items) {
-  std::stable_sort(items.begin(), items.end(),
-                   [](const Stamped& a, const Stamped& b) { return a.stamp < b.stamp; });
+  sort_stably(items, [](const Stamped& a, const Stamped& b) { return a.stamp < b.stamp; });
 }
 
 }  // namespace

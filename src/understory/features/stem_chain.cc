@@ -8,6 +8,7 @@
 #include "understory/features/features_constants.h"
 #include "understory/geometry/symmetric_solver.h"
 #include "understory/util/median.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -195,7 +196,7 @@ std::vector<int> seed_order(const std::vector<StemSection>& sections) {
     const int open = (section.left == Side::kOpen ? 1 : 0) + (section.right == Side::kOpen ? 1 : 0);
     return 100 * open + std::min(section.returns, 20);
   };
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return worth(a) > worth(b); });
+  sort_stably(order, [&](int a, int b) { return worth(a) > worth(b); });
   return order;
 }
 

@@ -13,6 +13,7 @@
 #include "understory/geometry/pose.h"
 #include "understory/geometry/rotation_between.h"
 #include "understory/util/median.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -124,8 +125,8 @@ StemSegment segment_of(const SectionView& view, double usual_radius_m, const Can
 
 // Of segments that stand at one place the better one stays.
 std::vector<StemSegment> without_doubles(std::vector<StemSegment> segments) {
-  std::stable_sort(segments.begin(), segments.end(),
-                   [](const StemSegment& a, const StemSegment& b) { return a.score > b.score; });
+  sort_stably(segments,
+              [](const StemSegment& a, const StemSegment& b) { return a.score > b.score; });
   std::vector<StemSegment> kept;
   for (const StemSegment& segment : segments) {
     const bool taken = std::any_of(kept.begin(), kept.end(), [&](const StemSegment& other) {
@@ -138,7 +139,7 @@ std::vector<StemSegment> without_doubles(std::vector<StemSegment> segments) {
     });
     if (!taken) kept.push_back(segment);
   }
-  std::stable_sort(kept.begin(), kept.end(), [](const StemSegment& a, const StemSegment& b) {
+  sort_stably(kept, [](const StemSegment& a, const StemSegment& b) {
     return a.foot.head<2>().squaredNorm() < b.foot.head<2>().squaredNorm();
   });
   return kept;

@@ -71,7 +71,7 @@ void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3
     stem.beam_excess_m = excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg);
     stem.radius_m -= stem.beam_excess_m;
     const double sd = diameter_sd_m(stem.spread_m, stem.arc_deg, range, stem.beam);
-    stem.covariance(2, 2) = 0.25 * sd * sd;
+    stem.covariance(2, 2) = 0.25 * sd * sd + stem.below_sd_m * stem.below_sd_m;
   }
 }
 

@@ -327,38 +327,6 @@ TEST(Inventory, WideBeamsAreTakenAwayWhereSensorAndPlacesAreKnown) {
   EXPECT_LT(known.dbh_sd_m, seen.dbh_sd_m);
 }
 
-// What stands before a stem hides its foot. Its diameter is then that of the stem above, with a
-// larger deviation. What is hidden higher up may as well be a crown.
-TEST(Inventory, AStemHiddenAroundBreastHeightIsMeasuredAbove) {
-  TestPlot plot(15);
-  plot.add_ground(12.0, 40);
-  TestPlot::Stem stem{6.0, 6.0, 0.3};
-  stem.points = 3000;
-  plot.add_stem(stem);
-  const auto hidden_to = [&](double top_m) {
-    std::vector<Eigen::Vector3d> rest;
-    for (const Eigen::Vector3d& p : plot.cloud) {
-      const double height = p.z() - plot.ground(p.x(), p.y());
-      if (height < 0.15 || height > top_m) rest.push_back(p);
-    }
-    return take_inventory(blocks_of(rest), {}).trees;
-  };
-  const std::vector<Tree> whole = hidden_to(0.15);
-  ASSERT_EQ(whole.size(), 1U);
-  const std::vector<Tree> above = hidden_to(1.8);
-  ASSERT_EQ(above.size(), 1U);
-  EXPECT_NEAR(above[0].dbh_m, 0.3, 2.0 * above[0].dbh_sd_m);
-  EXPECT_NEAR(above[0].dbh_m, 0.3, 0.02);
-  EXPECT_GT(above[0].dbh_sd_m, whole[0].dbh_sd_m);
-  const std::vector<Tree> high = hidden_to(2.3);  // its deviation tells of the taper
-  ASSERT_EQ(high.size(), 1U);
-  EXPECT_NEAR(high[0].dbh_m, 0.3, 2.0 * high[0].dbh_sd_m);
-  EXPECT_GT(high[0].dbh_sd_m, above[0].dbh_sd_m);
-  // Less than a metre of it is a crown that may hang anywhere.
-  for (const Tree& tree : hidden_to(2.8))
-    EXPECT_TRUE(std::isnan(tree.dbh_m));
-}
-
 // Five eighths of a stem are seen, from afar: its diameter is uncertain, and that it stands is not.
 TEST(Inventory, AThinStemSeenInPartIsListed) {
   for (const int points : {700, 2500}) {

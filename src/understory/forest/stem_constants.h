@@ -95,6 +95,19 @@ inline constexpr double kFewSlicesSd = 0.35;
 inline constexpr double kThickSlices = 3.0;
 // Thick slices that show a stem at least [not recorded]
 inline constexpr int kLeastThickSlices = 2;
+// m that the slices of a search for hidden stems lie higher [chosen: feet that are hidden to 3 m,
+// to 4 m]
+inline constexpr std::array<double, 2> kHiddenRises = {1.0, 2.0};
+// m above the ground, with the rise: heights of these searches, from ... [tuned on `random` 3, 13,
+// 14]
+inline constexpr double kHiddenLowest = 1.25;
+// ... to [tuned likewise]
+inline constexpr double kHiddenHighest = 3.25;
+// m of heights below such a search in which a shadow has to show [chosen]
+inline constexpr double kShadowHeight = 1.0;
+// m/m: how far the taper of stems differs from the usual one, below what was seen [chosen:
+// stem_fit::kTaperSd]
+inline constexpr double kTaperSdBelow = 0.006;
 // m: distance of connected points in a thin slice [not recorded]
 inline constexpr double kThinReach = 0.08;
 // m: the same in a thick slice [not recorded]
@@ -147,6 +160,13 @@ inline constexpr double kFitsBeyond = 3.0;
 // m beyond a tile in which circles are looked for: a leaning stem's lie so far apart [chosen]
 inline constexpr double kRingsBeyond = 6.0;
 }  // namespace stem_detector
+
+namespace shadowed_points {  // forest/slice/shadowed_points.cc
+// m: edge of the squares that points are counted in [chosen]
+inline constexpr double kSquare = 0.5;
+// Points below over those that are searched, over a shadow at most [tuned on `random` 3, 13, 14]
+inline constexpr double kBelowShare = 0.1;
+}  // namespace shadowed_points
 
 namespace not_a_tree {  // forest/stems/not_a_tree.cc
 // m above the ground: posts and people end below [bound: people]

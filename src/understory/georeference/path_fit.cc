@@ -13,6 +13,7 @@
 #include "understory/geometry/symmetric_eigen.h"
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/median.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -254,8 +255,7 @@ std::vector<std::pair<double, Motion>> starts(const std::vector<Vector3d>& path,
     const Pairs pairs = coarse.pairs(end);
     ends.emplace_back(Fitter::value_of(pairs, std::numeric_limits<double>::infinity()), end);
   }
-  std::stable_sort(ends.begin(), ends.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  sort_stably(ends, [](const auto& a, const auto& b) { return a.first < b.first; });
   return ends;
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "understory/util/stable_sort.h"
+
 namespace understory {
 namespace {
 
@@ -38,8 +40,8 @@ std::vector<CutTree> match_cuts(const std::vector<HeadCut>& cuts,
       if (distance <= config.reach_m && !stood_on) pairs.push_back({distance, c, t});
     }
   }
-  std::stable_sort(pairs.begin(), pairs.end(),
-                   [](const Pairing& a, const Pairing& b) { return a.distance_m < b.distance_m; });
+  sort_stably(pairs,
+              [](const Pairing& a, const Pairing& b) { return a.distance_m < b.distance_m; });
   std::vector<CutTree> result(cuts.size());
   std::vector<char> taken(trees.size(), 0);
   for (const Pairing& pair : pairs) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/util/stable_sort.h"
+
 namespace understory {
 namespace {
 
@@ -88,7 +90,7 @@ std::vector<PiecePlaces> places_to_try(const std::vector<Pose>& poses, const Map
                          distance(poses, place, query)});
     }
   }
-  std::stable_sort(choices.begin(), choices.end(), [](const Choice& a, const Choice& b) {
+  sort_stably(choices, [](const Choice& a, const Choice& b) {
     return a.tries != b.tries ? a.tries < b.tries : a.distance_m < b.distance_m;
   });
   choices.resize(std::min(choices.size(), static_cast<std::size_t>(config.max_candidates)));
@@ -109,7 +111,7 @@ std::vector<PiecePlaces> all_places_to_try(const std::vector<Pose>& poses, const
         pairs.push_back(in_order(here, there));
     }
   }
-  std::stable_sort(pairs.begin(), pairs.end(), [&](const PiecePlaces& a, const PiecePlaces& b) {
+  sort_stably(pairs, [&](const PiecePlaces& a, const PiecePlaces& b) {
     return distance(poses, a.older, a.newer) < distance(poses, b.older, b.newer);
   });
   return pairs;

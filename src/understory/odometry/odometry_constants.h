@@ -138,6 +138,16 @@ inline constexpr double kSmearRangeM = 10.0;
 inline constexpr double kPartShare = 0.75;
 }  // namespace start_in_motion
 
+namespace preintegration {  // odometry/imu/preintegration.cc
+// Times of a spacing between samples that the next one may be long [chosen: jitter of a clock]
+inline constexpr double kEvenSpacing = 1.5;
+// s between the samples of a sensor that shows its noise [bound: walking at 8 Hz shows no more than
+// the setting of 0.03 m/s^2/sqrt(Hz)]
+inline constexpr double kSlowestSpacingS = 0.0105;
+// Second differences that show a noise at least [chosen: a tenth of a second at 100 Hz has 8]
+inline constexpr int kFewestTriples = 5;
+}  // namespace preintegration
+
 namespace imu_smoother {  // odometry/imu/imu_smoother.cc
 // rad: the world is levelled once its tilt is known this well [chosen]
 inline constexpr double kLevelSigma = 0.1 * kRadPerDegree;

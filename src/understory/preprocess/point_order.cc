@@ -9,6 +9,7 @@
 #include "understory/preprocess/preprocess_constants.h"
 #include "understory/util/median.h"
 #include "understory/util/random.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -70,8 +71,7 @@ void shuffle(std::vector<TimedAngles>& points) {
 bool times_in_no_order(const Scan& scan) {
   if (!scan.has_point_times || scan.points.size() < kLeastPoints) return false;
   std::vector<TimedAngles> points = sample_of(scan);
-  std::stable_sort(points.begin(), points.end(),
-                   [](const TimedAngles& a, const TimedAngles& b) { return a.t_ns < b.t_ns; });
+  sort_stably(points, [](const TimedAngles& a, const TimedAngles& b) { return a.t_ns < b.t_ns; });
   if (different_times(points) < kLeastTimes) return false;
   std::vector<TimedAngles> mixed = points;
   shuffle(mixed);

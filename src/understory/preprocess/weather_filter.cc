@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -67,10 +68,15 @@ std::size_t WeatherFilter::drop(BodyCloud& cloud, const Pose& world_from_body) {
 }
 
 bool WeatherFilter::judges(const Scan& scan) const {
-  return config_.enabled &&
-         std::any_of(scan.points.begin(), scan.points.end(), [&](const ScanPoint& point) {
-           return point.intensity != scan.points.front().intensity;
-         });
+  if (!config_.enabled) return false;
+  float least = std::numeric_limits<float>::infinity();
+  float most = -least;
+  for (const ScanPoint& point : scan.points) {
+    if (!std::isfinite(point.intensity)) continue;
+    least = std::min(least, point.intensity);
+    most = std::max(most, point.intensity);
+  }
+  return least < most;
 }
 
 void WeatherFilter::look(const BodyCloud& cloud) {

@@ -12,6 +12,7 @@
 #include "understory/forest/stems/stem_fit.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -186,7 +187,7 @@ std::vector<SliceStem> measure_slice(std::vector<SlicePoint>& points,
     found[i] = measure(points, circles[i], config);
   });
   std::erase_if(found, [](const Candidate& candidate) { return !candidate.accepted; });
-  std::stable_sort(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) {
+  sort_stably(found, [](const Candidate& a, const Candidate& b) {
     const double qa = a.fit.evidence.even_arc_deg * a.fit.evidence.returns;
     const double qb = b.fit.evidence.even_arc_deg * b.fit.evidence.returns;
     return qa > qb;

@@ -7,6 +7,7 @@
 
 #include "understory/forest/stand_constants.h"
 #include "understory/forest/stand_figure_constants.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -153,7 +154,7 @@ Measured quadratic_mean(const PlotSums& sums) {
 Measured dominant_height(const PlotSums& sums, double wanted) {
   std::vector<const StandTree*> trees = sums.trees();
   if (wanted < kLeastDominant || static_cast<double>(trees.size()) < wanted) return {};
-  std::stable_sort(trees.begin(), trees.end(), [](const StandTree* a, const StandTree* b) {
+  sort_stably(trees, [](const StandTree* a, const StandTree* b) {
     return a->dbh_m.value > b->dbh_m.value;
   });
   double left = wanted;

@@ -11,6 +11,7 @@
 
 #include "understory/forest/stem_constants.h"
 #include "understory/geometry/rotation_between.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -143,8 +144,7 @@ std::vector<Scored> scored(const std::vector<Vector3d>& points,
   std::vector<Scored> result;
   for (const Vector3d& axis : directions)
     result.emplace_back(ColumnCounts(points, axis, cell).gain(), axis);
-  std::stable_sort(result.begin(), result.end(),
-                   [](const Scored& a, const Scored& b) { return a.first > b.first; });
+  sort_stably(result, [](const Scored& a, const Scored& b) { return a.first > b.first; });
   return result;
 }
 

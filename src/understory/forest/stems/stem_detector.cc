@@ -12,6 +12,7 @@
 #include "understory/forest/stems/stem_fit.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -79,6 +80,7 @@ struct Cut {
   int min_slices = 3;
   double reach_m = kThinReach;
   double band_m = kThinBand;
+  bool only_clear = false;  // columns that stand clear or alone, and nothing else
 };
 
 std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
@@ -149,6 +151,11 @@ bool stands_alone(const StemFitResult& fit, const StemDetectorConfig& config) {
          e.scatter_m <= kAloneScatterShare * fit.stem.radius_m + kAloneScatter;
 }
 
+// Through the highest slice.
+bool reaches_top(const StemFit& stem, const StemDetectorConfig& config) {
+  return stem.highest_m > config.highest_m - config.slice_m;
+}
+
 // A column with hardly a point beside or inside it, from bottom to top: a stem that was seen from
 // one side, from afar. Its diameter may be uncertain, and what stands before it may hide its foot.
 // `radius_sd_m`: of the radius at breast height.
@@ -157,8 +164,7 @@ bool is_clear_column(const StemFitResult& fit, const StemDetectorConfig& config,
   const StemFit& stem = fit.stem;
   const StemEvidence& e = fit.evidence;
   return e.inside_ratio + e.outside_ratio <= kClearClutter && lean_deg_of(stem) <= kAloneLeanDeg &&
-         stem.highest_m - stem.lowest_m >= kClearExtent &&
-         stem.highest_m > config.highest_m - config.slice_m &&
+         stem.highest_m - stem.lowest_m >= kClearExtent && reaches_top(stem, config) &&
          stem.lowest_m <= kBreastHeight + kClearBeginsAbove &&
          e.slices >= kAloneSlices * slices_between(stem, config) &&
          e.even_arc_deg >= kClearArcDeg && e.scatter_m <= kClearScatterShare * stem.radius_m &&
@@ -184,7 +190,9 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
       e.even_arc_deg < kEvenArcOfLeast * config.min_arc_deg) {
     return false;
   }
-  if (is_clear_column(fit, config, std::sqrt(std::max(0.0, stem.covariance(2, 2))))) return true;
+  const bool clear = is_clear_column(fit, config, std::sqrt(std::max(0.0, stem.covariance(2, 2))));
+  if (clear) return true;
+  if (cut.only_clear) return reaches_top(stem, config) && stands_alone(fit, config);
   if (e.even_arc_deg < kEvenArcShare * stem.arc_deg) return false;
   // What begins higher is a branch or a crown.
   if (stem.lowest_m > kBreastHeight + kBeginsAbove || dbh_sd > kDbhSd + kDbhSdShare * dbh)
@@ -206,7 +214,7 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
 // another side in each slice is a piece of a machine or a heap of branches. A stem's pieces were
 // filled to 0.67 and more on the tuning maps. What shows in few slices has to stand clear, and must
 // not be cut off where it was seen well.
-bool is_stem_still(const StemFitResult& fit, const StemDetectorConfig& config) {
+bool is_stem_still(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig& config) {
   const StemFit& stem = fit.stem;
   const StemEvidence& e = fit.evidence;
   if (!fit.converged || 2.0 * stem.radius_m < config.min_dbh_m ||
@@ -217,6 +225,7 @@ bool is_stem_still(const StemFitResult& fit, const StemDetectorConfig& config) {
   }
   if (is_clear_column(fit, config, kClearSpreads * stem.spread_m)) return true;
   if (e.fill < kLeastFill) return false;
+  if (cut.only_clear) return reaches_top(stem, config) && stands_alone(fit, config);
   const double all = (config.highest_m - config.lowest_m) / config.slice_m;
   if (e.slices >= kShownByMost * all) return true;
   const double sd = std::sqrt(std::max(0.0, stem.covariance(2, 2)));
@@ -235,7 +244,7 @@ bool same_stem(const StemFit& a, const StemFit& b) {
 
 // Best supported first: many returns, evenly on the parts that were seen.
 void sort_by_support(std::vector<StemFitResult>& fits) {
-  std::stable_sort(fits.begin(), fits.end(), [](const StemFitResult& a, const StemFitResult& b) {
+  sort_stably(fits, [](const StemFitResult& a, const StemFitResult& b) {
     const double qa = a.evidence.patches * a.evidence.fill;
     const double qb = b.evidence.patches * b.evidence.fill;
     if (qa != qb) return qa > qb;
@@ -305,6 +314,31 @@ Cut cut_of(StemCut cut, const StemDetectorConfig& config) {
   return {kThickSlices * config.slice_m, kLeastThickSlices, kThickReach, kThickBand};
 }
 
+// The stem in a frame whose heights are less by `rise_m`: what was so much higher is at breast
+// height.
+StemFit seen_from_above(StemFit stem, double rise_m) {
+  stem.centre += rise_m * stem.slope;
+  stem.radius_m += rise_m * stem.taper;
+  return stem;
+}
+
+// The way back. The diameter at breast height then has the error of the usual taper, and the foot
+// that of the lean.
+StemFit seen_from_below(StemFit stem, double rise_m) {
+  stem.centre -= rise_m * stem.slope;
+  stem.radius_m -= rise_m * stem.taper;
+  stem.below_sd_m = rise_m * kTaperSdBelow;
+  stem.covariance(2, 2) += stem.below_sd_m * stem.below_sd_m;
+  // The centre line's covariance grows with the square of the way to the foot.
+  const double longer = (kBreastHeight + rise_m) / kBreastHeight;
+  stem.foot_covariance *= longer * longer;
+  stem.lowest_m += rise_m;
+  stem.highest_m += rise_m;
+  for (StemSlice& slice : stem.slices)
+    slice.height_m += static_cast<float>(rise_m);
+  return stem;
+}
+
 // The thinned points, and which of them the stems found so far explain.
 struct Search {
   explicit Search(std::vector<SlicePoint>& all)
@@ -344,7 +378,7 @@ std::vector<StemFitResult> fit_starts(const Search& search, const std::vector<St
     accepted[i] = is_stem(fits[i], cut, config) ? 1 : 0;
     if (accepted[i] != 0) {
       fits[i] = refine_stem(near, fits[i], config);
-      accepted[i] = is_stem_still(fits[i], config) &&
+      accepted[i] = is_stem_still(fits[i], cut, config) &&
                     is_tree(fits[i].stem, search.index, search.points, config);
     }
   });
@@ -400,6 +434,40 @@ std::vector<StemFit> detect_stems_in_cut(StemCut cut, std::vector<SlicePoint>& p
   std::vector<StemFit> stems(search.stems.begin() + static_cast<std::ptrdiff_t>(known.size()),
                              search.stems.end());
   std::erase_if(stems, [&](const StemFit& stem) { return !where.area.contains(stem.centre); });
+  return stems;
+}
+
+std::vector<HeightRange> hidden_stem_heights(const StemDetectorConfig& config) {
+  std::vector<HeightRange> heights;
+  for (const double rise : kHiddenRises)
+    heights.push_back({kHiddenLowest + rise, kHiddenHighest + rise});
+  // A shadow shows only where there are heights below.
+  std::erase_if(heights, [&](const HeightRange& range) {
+    return range.lowest_m < config.lowest_m + kShadowHeight;
+  });
+  return heights;
+}
+
+std::vector<StemFit> detect_hidden_stems(
+    const HeightRange& heights, std::vector<SlicePoint>& points, const std::vector<StemFit>& known,
+    const StemDetectorConfig& config, const StemSearchArea& where, const ProgressSink& progress) {
+  const double rise = heights.lowest_m - kHiddenLowest;
+  for (SlicePoint& point : points)
+    point.height_m -= static_cast<float>(rise);
+  Search search(points);
+  for (const StemFit& stem : known)
+    search.know(seen_from_above(stem, rise));
+  Cut cut = cut_of(StemCut::kThin, config);
+  cut.only_clear = true;
+  StemDetectorConfig lowered = config;
+  lowered.lowest_m = kHiddenLowest;
+  lowered.highest_m = kHiddenHighest;
+  add_stems(cut, lowered, where, progress, search);
+  std::vector<StemFit> stems;
+  for (std::size_t i = known.size(); i < search.stems.size(); ++i) {
+    StemFit stem = seen_from_below(search.stems[i], rise);
+    if (where.area.contains(stem.centre)) stems.push_back(std::move(stem));
+  }
   return stems;
 }
 

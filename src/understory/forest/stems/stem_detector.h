@@ -56,6 +56,8 @@ struct StemFit {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();       // of centre x, y and radius
   Eigen::Matrix2d foot_covariance = Eigen::Matrix2d::Zero();  // of the centre line at the ground
   double spread_m = 0.0;  // of the radius, if returns were independent; see diameter_sd_m
+  // Of the radius, one standard deviation: how the taper may differ below what was seen.
+  double below_sd_m = 0.0;
   double rms_m = 0.0;     // of the points on the surface
   double arc_deg = 0.0;   // covered by points
   int returns = 0;        // of the cloud
@@ -90,6 +92,20 @@ enum class StemCut { kThin, kThick };
                                                        const StemDetectorConfig& config,
                                                        const StemSearchArea& where,
                                                        const ProgressSink& progress);
+// Metres above the ground.
+struct HeightRange {
+  double lowest_m = 0.0;
+  double highest_m = 0.0;
+};
+// The heights of the searches for stems whose foot is hidden, one after the other. Each lies 1 m
+// and more above lowest_m.
+[[nodiscard]] std::vector<HeightRange> hidden_stem_heights(const StemDetectorConfig& config);
+// Stems among points of such heights that none of the known ones explains. Only columns that stand
+// clear or alone count. Their diameter at breast height follows from the usual taper, and its
+// covariance holds what tapers may differ. Gives the stems with the centre in the area.
+[[nodiscard]] std::vector<StemFit> detect_hidden_stems(
+    const HeightRange& heights, std::vector<SlicePoint>& points, const std::vector<StemFit>& known,
+    const StemDetectorConfig& config, const StemSearchArea& where, const ProgressSink& progress);
 // m around the area: points so far away may matter, and stems known of the first cut.
 [[nodiscard]] double stem_search_reach(const StemDetectorConfig& config);
 // By x, then y of the centre.

@@ -1,11 +1,13 @@
 #include "understory/forest/tiles/stem_tiles.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <span>
 #include <utility>
 
 #include "understory/forest/forest_constants.h"
+#include "understory/forest/slice/shadowed_points.h"
 #include "understory/forest/slice/slice_thinner.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/tiles/tile_shelf.h"
@@ -49,7 +51,8 @@ class StemTiles {
         origin_(origin),
         config_(config),
         progress_(progress),
-        slices_(cloud.tiles().size(), cloud.scratch()) {}
+        slices_(cloud.tiles().size(), cloud.scratch()),
+        above_(cloud.tiles().size(), cloud.scratch()) {}
 
   StemHarvest run() {
     StemHarvest harvest;
@@ -68,10 +71,29 @@ class StemTiles {
     if (gathered.size() == 1) {
       harvest.slices = slices_.take(0);
       harvest.stems = detect_stems(harvest.slices, config_, {{}, origin_.head<2>()}, progress_);
+      const std::vector<SlicePoint> above = above_.take(0);
+      for (const HeightRange& heights : hidden_stem_heights(config_)) {
+        std::vector<SlicePoint> points =
+            points_over_shadows(harvest.slices, above, heights.lowest_m, heights.highest_m);
+        add(detect_hidden_stems(heights, points, harvest.stems, config_, {{}, origin_.head<2>()},
+                                progress_),
+            harvest.stems);
+      }
       return harvest;
     }
-    for (const StemCut cut : {StemCut::kThin, StemCut::kThick})
-      search(cut, harvest.stems);
+    for (const StemCut cut : {StemCut::kThin, StemCut::kThick}) {
+      search(harvest.stems, 0.0, [&](Nearby nearby, const StemSearchArea& where) {
+        return detect_stems_in_cut(cut, nearby.slices, nearby.stems, config_, where, progress_);
+      });
+    }
+    for (const HeightRange& heights : hidden_stem_heights(config_)) {
+      search(harvest.stems, shadow_reach_m(), [&](Nearby nearby, const StemSearchArea& where) {
+        const std::vector<SlicePoint> above = points_in(above_, cloud_, origin_, nearby.around);
+        std::vector<SlicePoint> points =
+            points_over_shadows(nearby.slices, above, heights.lowest_m, heights.highest_m);
+        return detect_hidden_stems(heights, points, nearby.stems, config_, where, progress_);
+      });
+    }
     add_shown(harvest.slices);
     harvest.thinned = std::move(slices_);
     return harvest;
@@ -85,6 +107,10 @@ class StemTiles {
   GatheredTile gather(std::size_t tile) {
     GatheredTile part;
     SliceThinner thinner(config_.thin_m);
+    SliceThinner above(config_.thin_m);
+    double highest_searched = config_.highest_m;
+    for (const HeightRange& heights : hidden_stem_heights(config_))
+      highest_searched = std::max(highest_searched, heights.highest_m);
     const GroundArea area = local(tile);
     std::vector<double> heights;
     // A cube at the border belongs to the tile that holds its corner.
@@ -101,35 +127,48 @@ class StemTiles {
         if (!(height >= 0.0 && height <= kHighest)) continue;
         if (here) part.ceiling.count(place, height);
         if (here && height < config_.highest_m) part.coverage.add(place);
-        if (!(height >= config_.lowest_m && height < config_.highest_m)) continue;
-        part.near_breast += here ? 1 : 0;
+        if (!(height >= config_.lowest_m && height < highest_searched)) continue;
+        const bool near_breast = height < config_.highest_m;
+        part.near_breast += here && near_breast ? 1 : 0;
         if (area.contains(thinner.corner_of(place.x(), place.y())))
-          thinner.add(place.x(), place.y(), height);
+          (near_breast ? thinner : above).add(place.x(), place.y(), height);
       }
     });
     slices_.put(tile, thinner.take());
+    above_.put(tile, above.take());
     return part;
   }
 
-  // Adds the stems of a cut to those of the ones before.
-  void search(StemCut cut, std::vector<StemFit>& stems) {
+  // What lies in and around a tile.
+  struct Nearby {
+    GroundArea around;
+    std::vector<SlicePoint> slices;
+    std::vector<StemFit> stems;  // that are known
+  };
+
+  // Adds the stems that `find` finds in each tile to those of the searches before. `farther_m`: how
+  // much more around a tile it has to know.
+  template <typename Find>
+  void search(std::vector<StemFit>& stems, double farther_m, const Find& find) {
     std::vector<std::vector<StemFit>> found(cloud_.tiles().size());
-    const double reach = stem_search_reach(config_);
+    const double reach = stem_search_reach(config_) + farther_m;
     for_tiles(cloud_, [&](std::size_t tile) {
       progress_.poll();
       const GroundArea area = local(tile);
-      const GroundArea around = area.grown(reach);
-      std::vector<SlicePoint> points = points_in(slices_, cloud_, origin_, around);
-      std::vector<StemFit> known;
+      Nearby nearby{area.grown(reach), {}, {}};
+      nearby.slices = points_in(slices_, cloud_, origin_, nearby.around);
       for (const StemFit& stem : stems) {
-        if (around.contains(stem.centre)) known.push_back(stem);
+        if (nearby.around.contains(stem.centre)) nearby.stems.push_back(stem);
       }
-      found[tile] =
-          detect_stems_in_cut(cut, points, known, config_, {area, origin_.head<2>()}, progress_);
+      found[tile] = find(std::move(nearby), {area, origin_.head<2>()});
     });
     for (std::vector<StemFit>& part : found)
-      stems.insert(stems.end(), std::make_move_iterator(part.begin()),
-                   std::make_move_iterator(part.end()));
+      add(std::move(part), stems);
+  }
+
+  static void add(std::vector<StemFit> found, std::vector<StemFit>& stems) {
+    stems.insert(stems.end(), std::make_move_iterator(found.begin()),
+                 std::make_move_iterator(found.end()));
     sort_by_place(stems);
   }
 
@@ -152,6 +191,7 @@ class StemTiles {
   const StemDetectorConfig& config_;
   const ProgressSink& progress_;
   TileShelf<SlicePoint> slices_;
+  TileShelf<SlicePoint> above_;  // of the heights over them, for stems whose foot is hidden
 };
 
 }  // namespace

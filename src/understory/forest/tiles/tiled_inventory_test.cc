@@ -81,6 +81,16 @@ const Cloud& stand() {
       stem.lean_x = random.uniform(-0.1, 0.1);
       plot.add_stem(stem);
     }
+    // Stems whose feet are hidden, on borders of tiles.
+    for (const double x : {25.0, 50.1, 60.9}) {
+      const double y = 20.0 - 4.0 * std::sin(0.2 * x);
+      for (int i = 0; i < 900; ++i) {
+        const double turn = random.uniform(0.0, M_PI);
+        const double r = 0.14 + random.normal(0.0, 0.006);
+        plot.cloud.emplace_back(x + r * std::cos(turn), y + r * std::sin(turn),
+                                plot.ground(x, y) + random.uniform(2.8, 6.0));
+      }
+    }
     for (int i = 0; i < 24'000; ++i) {
       const double x = random.uniform(0.0, 100.0);
       const double y = 20.0 + 4.0 * std::sin(0.2 * x) + random.normal(0.0, 0.04);
@@ -147,7 +157,10 @@ std::vector<std::uint32_t> labels_of(const InventoryResult& result, const TiledC
 
 TEST(TiledInventory, TheSameTreesWhateverTheTilesAre) {
   const InventoryResult whole = take_inventory(blocks_of(stand()), {});
-  EXPECT_GE(whole.trees.size(), 22U);
+  EXPECT_GE(whole.trees.size(), 25U);
+  const auto hidden = std::count_if(whole.stems.begin(), whole.stems.end(),
+                                    [](const StemFit& stem) { return stem.below_sd_m > 0.0; });
+  EXPECT_GE(hidden, 3);
   const std::vector<std::uint32_t> labels = labels_of(whole, nullptr);
   bool backwards = false;
   for (const double tile_m : {128.0, 50.0, 25.0, 20.3}) {

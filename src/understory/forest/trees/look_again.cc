@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "understory/forest/forest_constants.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -142,7 +143,7 @@ std::vector<LookPlace> places_to_look(const std::vector<StandingStem>& stems,
     }
     if (most == nullptr || (most->size() < kLeastStems && !places.empty())) break;
     LookPlace place{middle_of(best), *most};
-    std::stable_sort(place.stems.begin(), place.stems.end(), [&](std::size_t a, std::size_t b) {
+    sort_stably(place.stems, [&](std::size_t a, std::size_t b) {
       return (stems[a].place - place.place).norm() < (stems[b].place - place.place).norm();
     });
     for (const std::size_t i : place.stems)

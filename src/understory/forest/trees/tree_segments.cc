@@ -6,6 +6,7 @@
 #include <unordered_set>
 
 #include "understory/forest/forest_constants.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -23,8 +24,7 @@ std::uint64_t cube_of(const Eigen::Vector3d& p) {
 
 std::vector<Tree> spread_over_diameters(std::vector<Tree> trees, int most) {
   std::erase_if(trees, [](const Tree& tree) { return std::isnan(tree.dbh_m); });
-  std::stable_sort(trees.begin(), trees.end(),
-                   [](const Tree& a, const Tree& b) { return a.dbh_m > b.dbh_m; });
+  sort_stably(trees, [](const Tree& a, const Tree& b) { return a.dbh_m > b.dbh_m; });
   std::vector<Tree> chosen;
   const auto n = static_cast<int>(trees.size());
   const int count = std::min(most, n);

@@ -11,6 +11,7 @@
 #include "understory/forest/trees/tree_doubt.h"
 #include "understory/forest/trees/tree_heights.h"
 #include "understory/sensor/tree.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -98,7 +99,7 @@ std::vector<char> most_doubtful(const std::vector<StemFit>& stems) {
   std::vector<std::size_t> order(stems.size());
   for (std::size_t i = 0; i < order.size(); ++i)
     order[i] = i;
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+  sort_stably(order, [&](std::size_t a, std::size_t b) {
     return doubt_of_stem(stems[a]) > doubt_of_stem(stems[b]);
   });
   for (std::size_t k = kMostSheets; k < order.size(); ++k)

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "understory/forest/forest_constants.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -34,8 +35,8 @@ std::vector<TreeInView> thick_by_distance(const std::vector<TreeInView>& trees) 
   std::vector<TreeInView> thick;
   for (const TreeInView& tree : trees)
     if (is_known(tree) && tree.dbh_m >= least) thick.push_back(tree);
-  std::stable_sort(thick.begin(), thick.end(),
-                   [](const TreeInView& a, const TreeInView& b) { return a.farness < b.farness; });
+  sort_stably(thick,
+              [](const TreeInView& a, const TreeInView& b) { return a.farness < b.farness; });
   return thick;
 }
 

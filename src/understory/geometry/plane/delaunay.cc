@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "understory/util/stable_sort.h"
+
 namespace understory {
 namespace {
 
@@ -186,7 +188,7 @@ std::vector<std::array<int, 3>> delaunay_triangles(const std::vector<Vector2d>& 
     const Vector2d& p = points[static_cast<std::size_t>(i)];
     return std::array<double, 2>{p.x(), p.y()};
   };
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
+  sort_stably(order, [&](int a, int b) { return key(a) < key(b); });
   Mesh mesh(unit);
   for (std::size_t i = 0; i < order.size(); ++i) {
     if (i > 0 && key(order[i]) == key(order[i - 1])) continue;

@@ -57,7 +57,12 @@ AntennaBelief beyond_free(const AntennaBelief& fix, const Vector3d& by_odometry,
   const auto free_steps = [&](double sd) {
     return config.free_sd * std::max(0.0, 1.0 - config.followed_sd_m / sd);
   };
-  const auto share = [](double free, double steps) { return free < steps ? free / steps : 1.0; };
+  // Of the way from the fix to the odometry that is free: 1 where all of it is. None is where the
+  // covariance tells nothing.
+  const auto share = [](double free, double steps) {
+    if (!(free > 0.0) || !std::isfinite(steps)) return 0.0;
+    return free < steps ? free / steps : 1.0;
+  };
   const Vector3d off = by_odometry - fix.place;
   const Eigen::Matrix2d plane = fix.covariance.topLeftCorner<2, 2>();
   const double steps = std::sqrt(off.head<2>().dot(plane.inverse() * off.head<2>()));
@@ -290,8 +295,9 @@ bool SatelliteBelief::is_old(const FixOnPath& fix, TimeNs now) const {
 }
 
 std::optional<PoseBelief> SatelliteBelief::heading_at(const StampedPose& predicted) const {
-  if (config_.use != SatellitesInMatch::kPenalty || !aligned() || fixes_.empty())
-    return std::nullopt;
+  const bool asked =
+      config_.use == SatellitesInMatch::kPenalty && config_.form != PenaltyForm::kOnePoint;
+  if (!asked || !aligned() || fixes_.empty()) return std::nullopt;
   const FixOnPath& newest = fixes_.back();
   if (is_old(newest, predicted.stamp) || !std::isfinite(newest.turn_rad)) return std::nullopt;
   PoseBelief belief;

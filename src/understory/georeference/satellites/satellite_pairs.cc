@@ -10,6 +10,7 @@
 
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/angles.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -168,8 +169,7 @@ SatellitePairs pair_by_time(const std::vector<StampedPose>& trajectory,
   const GnssFix& first = fixes.front();
   result.origin = {first.latitude_deg, first.longitude_deg, height(first)};
   const EastNorthUp frame(*result.origin);
-  std::stable_sort(fixes.begin(), fixes.end(),
-                   [](const GnssFix& a, const GnssFix& b) { return a.stamp < b.stamp; });
+  sort_stably(fixes, [](const GnssFix& a, const GnssFix& b) { return a.stamp < b.stamp; });
   result.first_fix = fixes.front().stamp;
   const TimeNs shift = from_seconds(config.time_offset_s);
   const Vector3d& arm = config.antenna_in_body;

@@ -7,6 +7,7 @@
 
 #include "understory/georeference/georeference_constants.h"
 #include "understory/util/median.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -95,8 +96,8 @@ std::vector<SourcePart> parts_of(const std::vector<PatternTree>& trees, std::siz
   const std::size_t step = 1 + trees.size() / 200;
   for (std::size_t i = 0; i < trees.size(); i += step)
     centres.emplace_back(square_reach(trees, trees[i].at, most, squares), trees[i].at);
-  std::stable_sort(centres.begin(), centres.end(),
-                   [](const auto& a, const auto& b) { return std::get<0>(a) < std::get<0>(b); });
+  sort_stably(centres,
+              [](const auto& a, const auto& b) { return std::get<0>(a) < std::get<0>(b); });
   std::vector<SourcePart> parts;
   for (const auto& [square, centre] : centres) {
     const Vector2d middle = centre;

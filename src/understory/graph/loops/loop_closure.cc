@@ -14,6 +14,7 @@
 #include "understory/graph/self_correction/structure.h"
 #include "understory/util/angles.h"
 #include "understory/util/parallel.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -99,8 +100,7 @@ std::vector<Pose> best_starts(const Side& target, const Side& source,
   std::vector<std::size_t> order(starts.size());
   for (std::size_t i = 0; i < order.size(); ++i)
     order[i] = i;
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return cost[a] < cost[b]; });
+  sort_stably(order, [&](std::size_t a, std::size_t b) { return cost[a] < cost[b]; });
   std::vector<Pose> best{starts.front()};
   for (const std::size_t i : order) {
     if (static_cast<int>(best.size()) >= std::max(config.refined_starts, 1)) break;

@@ -6,6 +6,7 @@
 #include <queue>
 
 #include "understory/util/error.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -108,7 +109,7 @@ std::vector<LoopCandidate> paper_candidates(const PoseGraphProblem& problem, std
 // Takes the best by overlap, one after another, that are `spacing` of way apart.
 std::vector<LoopCandidate> spread(std::vector<LoopCandidate> all, const std::vector<double>& way,
                                   const LoopSearchConfig& config) {
-  std::stable_sort(all.begin(), all.end(), [](const LoopCandidate& a, const LoopCandidate& b) {
+  sort_stably(all, [](const LoopCandidate& a, const LoopCandidate& b) {
     return a.expected_overlap > b.expected_overlap;
   });
   std::vector<LoopCandidate> chosen;

@@ -10,6 +10,7 @@
 #include "understory/util/index.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -174,7 +175,7 @@ std::vector<CorrectionPair> ordered(std::vector<CorrectionPair> pairs, Correctio
                      gaps.end());
     middle = gaps[gaps.size() / 2];
   }
-  std::stable_sort(pairs.begin(), pairs.end(), [&](const auto& a, const auto& b) {
+  sort_stably(pairs, [&](const auto& a, const auto& b) {
     return std::abs(a.gap() - middle) < std::abs(b.gap() - middle);
   });
   return pairs;

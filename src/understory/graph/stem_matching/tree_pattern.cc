@@ -7,6 +7,7 @@
 
 #include "understory/graph/graph_constants.h"
 #include "understory/util/error.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -146,8 +147,7 @@ void TreePatterns::add(int id, const SparsePoints& level_points) {
 }
 
 void TreePatterns::finish() {
-  std::stable_sort(entries_.begin(), entries_.end(),
-                   [](const Entry& a, const Entry& b) { return a.key < b.key; });
+  sort_stably(entries_, [](const Entry& a, const Entry& b) { return a.key < b.key; });
   first_.assign((1U << 16) + 1, 0);
   for (const Entry& entry : entries_)
     ++first_[(entry.key >> 48) + 1];

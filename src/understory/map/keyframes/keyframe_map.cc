@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <span>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -170,16 +171,27 @@ std::optional<Pose> KeyframeMap::take_over(LoopOutcome outcome) {
   // A search that began in the piece before has made a map of that.
   if (!(outcome.local_map || outcome.map_begins_at) || known <= segment_start()) {
     rebuild_local_map();
+    give_back();
     return moved;
   }
   take_local_map(outcome);
-  returning_.note_made_anew(keyframes_, local_map_.radius_m());
   for (std::size_t i = std::max(known, segment_start()); i < keyframes_.size(); ++i) {
     insert(i);
   }
+  returning_.note_made_anew(inserted_);
   take_snapshot();
-  giving_back_ = std::async(std::launch::async, return_freed_memory);
+  give_back();
   return moved;
+}
+
+// What the search and the map before have left goes back to the system beside the scan loop. Where
+// no thread is to be had it stays.
+void KeyframeMap::give_back() {
+  try {
+    giving_back_ = std::async(std::launch::async, return_freed_memory);
+  } catch (const std::system_error& e) {
+    log_.debug(fmt::format("memory is not given back: {}", e.what()));
+  }
 }
 
 // The map that the search made, or the same one, made in the place of the present one.
@@ -312,7 +324,7 @@ void KeyframeMap::rebuild_local_map() {
     }
   } else {
     inserted_ = keyframes_within_reach(positions, first, local_map_.radius_m());
-    returning_.note_made_anew(keyframes_, local_map_.radius_m());
+    returning_.note_made_anew(inserted_);
   }
   insert_all();
 }

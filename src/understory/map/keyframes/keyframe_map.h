@@ -156,6 +156,7 @@ class KeyframeMap {
   void update_local_map(std::size_t keyframe);
   void insert(std::size_t keyframe);
   void insert(std::size_t keyframe, bool forget);
+  void give_back();
   void take_local_map(LoopOutcome& outcome);
   void tell_of_radius();
   void take_snapshot();
@@ -185,8 +186,7 @@ class KeyframeMap {
   bool told_of_radius_ = false;
   std::vector<char> loops_used_;
   LoopCloser loops_;
-  // Hands back what the last loop that was found has left free, beside the scan loop.
-  std::future<void> giving_back_;
+  std::future<void> giving_back_;  // see give_back()
 };
 
 }  // namespace understory

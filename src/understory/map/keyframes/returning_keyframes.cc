@@ -18,16 +18,23 @@ void ReturningKeyframes::add(bool held) {
 std::vector<std::size_t> ReturningKeyframes::take(const std::vector<Keyframe>& keyframes,
                                                   std::size_t first, double radius_m) {
   const std::size_t newest = held_.size() - 1;
+  gone_[newest] = 0;
   const bool held = held_[newest] != 0;
   const auto begin = held_.begin() + static_cast<std::ptrdiff_t>(first);
   const bool first_held = held && std::count(begin, held_.end(), 1) == 1;
+  // Over the first stretch the odometry has not drifted yet.
+  double way_m = 0.0;
+  for (std::size_t i = newest; first_held && i > first && way_m < radius_m; --i) {
+    held_[i] = 1;
+    way_m += (keyframes[i].world_from_body.translation() -
+              keyframes[i - 1].world_from_body.translation())
+                 .norm();
+  }
   std::vector<std::pair<double, std::size_t>> near;
   for (std::size_t i = first; i < newest; ++i) {
     const double away_m = (keyframes[i].world_from_body.translation() -
                            keyframes[newest].world_from_body.translation())
                               .norm();
-    // Over the first stretch the odometry has not drifted yet.
-    if (first_held && away_m < radius_m) held_[i] = 1;
     if (away_m >= radius_m) gone_[i] = 1;
     if (gone_[i] != 0 && held_[i] != 0 && held && away_m < kNear * radius_m)
       near.emplace_back(away_m, i);
@@ -42,12 +49,10 @@ std::vector<std::size_t> ReturningKeyframes::take(const std::vector<Keyframe>& k
   return coming;
 }
 
-void ReturningKeyframes::note_made_anew(const std::vector<Keyframe>& keyframes, double radius_m) {
-  for (std::size_t i = 0; i < gone_.size(); ++i) {
-    const Eigen::Vector3d away = keyframes[i].world_from_body.translation() -
-                                 keyframes[gone_.size() - 1].world_from_body.translation();
-    gone_[i] = away.norm() >= radius_m ? 1 : 0;
-  }
+void ReturningKeyframes::note_made_anew(const std::vector<LocalMapInsertion>& in_map) {
+  std::fill(gone_.begin(), gone_.end(), std::uint8_t{1});
+  for (const LocalMapInsertion& insertion : in_map)
+    gone_[insertion.keyframe] = 0;
 }
 
 void ReturningKeyframes::save(BinaryWriter& writer) const {

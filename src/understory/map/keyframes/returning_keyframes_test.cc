@@ -60,6 +60,16 @@ TEST(ReturningKeyframes, TheWayBeforeTheFirstOneHeldIsHeldToo) {
   (void)way.jump_to(100.0, true);
   for (double x = 101.0; x < 250.0; x += 1.0)
     (void)way.jump_to(x, true);
+  // As far as the odometry went, not as far as the crow flies.
+  Way around;
+  for (int round = 0; round < 4; ++round)
+    (void)around.out_to(30.0, false);
+  for (double x = 0.0; x < 200.0; x += 1.0)
+    (void)around.jump_to(x, true);
+  for (int k = 0; k < 60; ++k) {
+    for (const std::size_t i : around.jump_to(10.2, true))
+      EXPECT_GE(i, 120U - 80U);
+  }
   EXPECT_TRUE(way.jump_to(-30.0, true).empty()) << "farther than the radius before the first held";
   EXPECT_EQ(way.jump_to(60.2, true).front(), 60U);
 }
@@ -68,8 +78,14 @@ TEST(ReturningKeyframes, AMapMadeAnewHoldsAllWithinItsRadius) {
   Way way;
   (void)way.out_to(150.0, true);
   way.go_to(10.2, true);
-  way.returning.note_made_anew(way.keyframes, kRadiusM);
+  std::vector<LocalMapInsertion> in_map;
+  for (std::size_t i = 0; i < 90; ++i)
+    in_map.push_back({i, 0});
+  in_map.push_back({150, 0});
+  way.returning.note_made_anew(in_map);
   EXPECT_TRUE(way.returning.take(way.keyframes, 0, kRadiusM).empty());
+  way.returning.note_made_anew({});
+  EXPECT_EQ(way.returning.take(way.keyframes, 0, kRadiusM).front(), 10U) << "what it lacks comes";
 }
 
 TEST(ReturningKeyframes, GoOnFromTheirState) {

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/odometry/odometry_constants.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
+
+using namespace odometry_constants::preintegration;
 
 // One sampling interval of `dt` seconds, rates and forces free of bias at both ends.
 struct Step {
@@ -18,19 +21,27 @@ struct Step {
 
 // The white noise of the accelerometer as its own samples show it, (m/s^2)^2/Hz, mean of the axes.
 // It is that of second differences, in which the motion of a carrier is next to nothing. Where an
-// engine or rotors shake the sensor faster than it samples, what they add looks like noise.
+// engine or rotors shake the sensor faster than it samples, what they add looks like noise. Samples
+// of a slow sensor, and those beside a gap, say nothing: there the motion itself would count. 0
+// with too few others.
 double shown_accel_noise(const std::vector<InertialSample>& samples) {
-  if (samples.size() < 3) return 0.0;
   double squares = 0.0;
+  double duration_s = 0.0;
+  int triples = 0;
   for (std::size_t i = 2; i < samples.size(); ++i) {
+    const double before_s = to_seconds(samples[i - 1].stamp - samples[i - 2].stamp);
+    const double after_s = to_seconds(samples[i].stamp - samples[i - 1].stamp);
+    const auto [shorter, longer] = std::minmax(before_s, after_s);
+    if (!(shorter > 0.0) || longer > kEvenSpacing * shorter || longer > kSlowestSpacingS) continue;
     squares += (samples[i - 2].specific_force() - 2.0 * samples[i - 1].specific_force() +
                 samples[i].specific_force())
                    .squaredNorm();
+    duration_s += 0.5 * (before_s + after_s);
+    ++triples;
   }
+  if (triples < kFewestTriples) return 0.0;
   // Of white noise the second difference has six times the variance.
-  const double variance = squares / (18.0 * static_cast<double>(samples.size() - 2));
-  const double duration = to_seconds(samples.back().stamp - samples.front().stamp);
-  return variance * duration / static_cast<double>(samples.size() - 1);
+  return squares / (18.0 * triples) * duration_s / triples;
 }
 
 void advance(Preintegration& sum, const Step& step, const ImuNoiseConfig& noise) {

@@ -194,5 +194,26 @@ TEST(Preintegration, AccelerometerThatIsShakenIsLessSure) {
   EXPECT_NEAR(sigma, noise.accel_noise_m_s2_sqrt_hz, 0.1 * noise.accel_noise_m_s2_sqrt_hz);
 }
 
+// A walk shakes a slow sensor as much as its second differences show; a gap makes them larger
+// still.
+TEST(Preintegration, SlowSensorsAndGapsShowNoNoise) {
+  const ImuNoiseConfig noise;
+  const auto sigma_of = [&](double rate, double gap_s) {
+    std::vector<InertialSample> samples;
+    for (double t = 0.0; t < 0.5; t += 1.0 / rate) {
+      if (t > 0.2 && t < 0.2 + gap_s) continue;
+      InertialSample sample;
+      sample.stamp = from_seconds(t);
+      sample.accel[0] = 3.0 * std::sin(2.0 * M_PI * 8.0 * t);
+      samples.push_back(sample);
+    }
+    const auto sum = preintegrate(samples, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), noise);
+    return std::sqrt(sum.covariance(3, 3) / to_seconds(samples.back().stamp));
+  };
+  for (const double rate : {50.0, 100.0, 200.0})
+    EXPECT_NEAR(sigma_of(rate, 0.0) / noise.accel_noise_m_s2_sqrt_hz, 1.0, 0.05) << rate;
+  EXPECT_NEAR(sigma_of(200.0, 0.2) / sigma_of(200.0, 0.0), 1.0, 0.3);
+}
+
 }  // namespace
 }  // namespace understory

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <string>
 #include <system_error>
@@ -19,6 +20,7 @@
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
 #include "understory/util/parallel.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -198,8 +200,7 @@ struct CopcWriter::Impl {
   [[nodiscard]] std::string hierarchy_page() const {
     std::vector<HierarchyEntry> entries = hierarchy;
     if (entries.empty()) entries.emplace_back();  // the root, without points
-    std::stable_sort(entries.begin(), entries.end(),
-                     [](const auto& a, const auto& b) { return a.key.level < b.key.level; });
+    sort_stably(entries, [](const auto& a, const auto& b) { return a.key.level < b.key.level; });
     std::string page;
     for (const HierarchyEntry& entry : entries) {
       put(page, entry.key.level);
@@ -234,8 +235,13 @@ struct CopcWriter::Impl {
     return bounds;
   }
   [[nodiscard]] std::string info(std::uint64_t page_at, std::uint64_t page_bytes) const {
-    const double half = 0.5 * (bounds().high - bounds().low).maxCoeff();
-    const Eigen::Vector3d centre = bounds().low.array() + half;
+    const Bounds around = bounds();
+    const Eigen::Vector3d centre = around.low.array() + 0.5 * (around.high - around.low).maxCoeff();
+    // Readers take centre less half: rounded, that must not lie above the lowest point.
+    const double rounding =
+        4.0 * std::numeric_limits<double>::epsilon() *
+        std::max(around.low.cwiseAbs().maxCoeff(), around.high.cwiseAbs().maxCoeff());
+    const double half = 0.5 * (around.high - around.low).maxCoeff() + rounding;
     std::string out;
     put_record(out, kInfoId, static_cast<std::uint16_t>(kInfo), "COPC info VLR");
     for (const double value :

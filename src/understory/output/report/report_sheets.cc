@@ -11,6 +11,7 @@
 #include "understory/forest/trees/tree_heights.h"
 #include "understory/output/report/png.h"
 #include "understory/output/report/report_parts.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -100,8 +101,7 @@ std::string sheets_part(const InventoryResult& inventory) {
   const auto doubt = [&](const TreeSheet* sheet) {
     return doubt_of(inventory.trees[sheet->tree], inventory.stems[sheet->tree].arc_deg);
   };
-  std::stable_sort(sheets.begin(), sheets.end(),
-                   [&](const TreeSheet* a, const TreeSheet* b) { return doubt(a) > doubt(b); });
+  sort_stably(sheets, [&](const TreeSheet* a, const TreeSheet* b) { return doubt(a) > doubt(b); });
   std::string html =
       "<h3>Tree by tree, the most doubtful first</h3><p>Front view, and the cross section 0.9–1.9 "
       "m "

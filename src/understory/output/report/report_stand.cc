@@ -9,6 +9,7 @@
 #include "understory/output/report/png.h"
 #include "understory/output/report/report_parts.h"
 #include "understory/output/report/svg_plot.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -127,8 +128,7 @@ std::string cross_sections(const InventoryResult& inventory) {
   if (panels.empty()) return "";
   const std::size_t all = panels.size();
   if (all > kMostPanels) {
-    std::stable_sort(panels.begin(), panels.end(),
-                     [](const Panel& a, const Panel& b) { return a.trees > b.trees; });
+    sort_stably(panels, [](const Panel& a, const Panel& b) { return a.trees > b.trees; });
     panels.resize(kMostPanels);
   }
   std::string html =

@@ -5,6 +5,8 @@
 #include "understory/calibration/lidar_imu/clock_check.h"
 #include "understory/calibration/lidar_imu/online_calibration.h"
 #include "understory/georeference/satellites/online_georeference.h"
+#include "understory/georeference/satellites/satellite_belief.h"
+#include "understory/map/keyframes/returning_keyframes.h"
 #include "understory/map/loop_closer.h"
 #include "understory/odometry/dense/recovery.h"
 #include "understory/odometry/imu/imu_watch.h"
@@ -34,7 +36,7 @@ std::size_t size_of(const Put& put) {
 // was begun before would have been read as another one. Where this fails, kCheckpointFormat grows
 // by one, and the sizes here become the new ones.
 TEST(CheckpointFormat, GrowsWithWhatIsKept) {
-  EXPECT_EQ(kCheckpointFormat, 15);
+  EXPECT_EQ(kCheckpointFormat, 16);
   Log log;
   const auto saved = [](const auto& part) {
     return size_of([&](BinaryWriter& writer) { part.save(writer); });
@@ -50,6 +52,8 @@ TEST(CheckpointFormat, GrowsWithWhatIsKept) {
   EXPECT_EQ(saved(Recovery(30)), 108U);
   EXPECT_EQ(saved(CarriedReturns(CarriedReturnsConfig())), 20U);
   EXPECT_EQ(saved(LoopCloser(LoopCloserConfig(), LocalMapConfig())), 17U);
+  EXPECT_EQ(saved(SatelliteBelief(SatelliteBeliefConfig(), 0.1)), 1U);
+  EXPECT_EQ(saved(ReturningKeyframes()), 16U);
   EXPECT_EQ(sizeof(DenseCounts), 184U);
   EXPECT_EQ(saved(FixJoiner()), 55U);
   EXPECT_EQ(size_of([](BinaryWriter& writer) { put_traits(writer, {}); }), 62U);

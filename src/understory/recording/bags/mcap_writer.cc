@@ -14,6 +14,7 @@
 #include "understory/recording/messages/message_schemas.h"
 #include "understory/util/error.h"
 #include "understory/util/files/output_file.h"
+#include "understory/util/stable_sort.h"
 #include "understory/util/version.h"
 
 namespace understory {
@@ -291,7 +292,7 @@ class McapWriter::Impl {
     for (std::uint16_t topic = 0; topic < kTopicCount; ++topic) {
       if (index_[topic].empty()) continue;
       entry.message_indexes[topic] = entry.offset + out.size();
-      std::stable_sort(index_[topic].begin(), index_[topic].end());
+      sort_stably(index_[topic], std::less<>());
       RecordWriter record(out, mcap::kMessageIndex);
       out.put(topic);
       out.put(static_cast<std::uint32_t>(index_[topic].size() * 16));

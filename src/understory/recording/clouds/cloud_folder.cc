@@ -22,6 +22,7 @@
 #include "understory/sensor/sensor_io.h"
 #include "understory/util/error.h"
 #include "understory/util/files/read_error.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -218,9 +219,8 @@ class CloudFolder : public Recording {
   void sort_by_time() {
     std::vector<std::size_t> order(names_.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return times_.stamps[a] < times_.stamps[b];
-    });
+    sort_stably(order,
+                [&](std::size_t a, std::size_t b) { return times_.stamps[a] < times_.stamps[b]; });
     std::vector<std::string> names;
     std::vector<TimeNs> stamps;
     for (const std::size_t i : order) {

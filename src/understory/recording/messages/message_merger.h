@@ -7,6 +7,8 @@
 
 #include "understory/recording/messages/message_source.h"
 
+#include "understory/util/stable_sort.h"
+
 namespace understory {
 
 // A part of a container file in memory (a chunk, unpacked) with the places of its messages.
@@ -41,8 +43,8 @@ class MessageMerger {
  public:
   void add(MessageBlock block) {
     if (block.entries.empty()) return;
-    std::stable_sort(block.entries.begin(), block.entries.end(),
-                     [](const auto& a, const auto& b) { return a.log_time < b.log_time; });
+    sort_stably(block.entries,
+                [](const auto& a, const auto& b) { return a.log_time < b.log_time; });
     bytes_ += block.bytes.size();
     blocks_.push_back({std::move(block), 0});
   }

@@ -10,6 +10,7 @@
 #include "understory/recording/messages/stored_messages_test_support.h"
 #include "understory/recording/recording_test_support.h"
 #include "understory/util/error.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -82,8 +83,7 @@ TEST(MessageRecording, UsesATransformThatComesAfterTheFirstScans) {
   const std::vector<NamedTransform> late = {{"front", "imu", Pose()}};
   messages.push_back({channel("/tf_static", "tf2_msgs/msg/TFMessage"), kStart + 8'000'000'000LL,
                       bytes_of(encode_transforms(late, kStart))});
-  std::stable_sort(messages.begin(), messages.end(),
-                   [](const Stored& a, const Stored& b) { return a.log_time < b.log_time; });
+  sort_stably(messages, [](const Stored& a, const Stored& b) { return a.log_time < b.log_time; });
   Log log;
   const auto recording = open_messages(
       "x.mcap", [&](Log&) { return std::make_unique<StoredSource>(messages); }, {}, log);
@@ -175,8 +175,7 @@ struct TwoReceivers {
       all.push_back(
           {second, later, bytes_of(encode_nav_sat_fix(fix_at(later, 1.0), second_frame))});
     }
-    std::stable_sort(all.begin(), all.end(),
-                     [](const Stored& a, const Stored& b) { return a.log_time < b.log_time; });
+    sort_stably(all, [](const Stored& a, const Stored& b) { return a.log_time < b.log_time; });
     return all;
   }
 };
@@ -323,8 +322,7 @@ TEST(MessageRecording, SentencesComeBeforePositionsOfASecondAntenna) {
     const TimeNs now = kStart + i * 200'000'000LL;
     messages.push_back({sentences, now, sentence_message(now, "gps_left", "$GPHDT,12.5,T\r\n")});
   }
-  std::stable_sort(messages.begin(), messages.end(),
-                   [](const Stored& a, const Stored& b) { return a.log_time < b.log_time; });
+  sort_stably(messages, [](const Stored& a, const Stored& b) { return a.log_time < b.log_time; });
   Log log;
   const auto recording = open_messages(
       "x.mcap", [&](Log&) { return std::make_unique<StoredSource>(messages); }, {}, log);

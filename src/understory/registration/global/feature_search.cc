@@ -11,6 +11,7 @@
 #include "understory/geometry/voxel_index.h"
 #include "understory/registration/global/global_constants.h"
 #include "understory/registration/global/level_cloud.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -268,7 +269,7 @@ std::vector<FeatureMatch> match_local_features(const std::vector<LocalFeature>& 
   const Consistency consistency(pairs);
   std::vector<std::size_t> order(pairs.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+  sort_stably(order, [&](std::size_t a, std::size_t b) {
     return consistency.degree(a) > consistency.degree(b);
   });
   order.resize(std::min(order.size(), kSeeds));
@@ -277,9 +278,8 @@ std::vector<FeatureMatch> match_local_features(const std::vector<LocalFeature>& 
     const FeatureMatch match = fit_from(pairs, consistency, seed);
     if (match.matched >= kFewestMatched) fits.push_back(match);
   }
-  std::stable_sort(fits.begin(), fits.end(), [](const FeatureMatch& a, const FeatureMatch& b) {
-    return a.matched > b.matched;
-  });
+  sort_stably(fits,
+              [](const FeatureMatch& a, const FeatureMatch& b) { return a.matched > b.matched; });
   std::vector<FeatureMatch> found;
   for (const FeatureMatch& match : fits) {
     if (found.size() >= most) break;

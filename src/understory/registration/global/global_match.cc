@@ -8,6 +8,7 @@
 #include "understory/registration/global/global_constants.h"
 #include "understory/registration/global/pose_evidence.h"
 #include "understory/registration/global/upright_search.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -15,9 +16,8 @@ namespace {
 using namespace registration_constants::global_match;
 
 void sort_by_score(std::vector<GlobalCandidate>& candidates) {
-  std::stable_sort(
-      candidates.begin(), candidates.end(),
-      [](const GlobalCandidate& a, const GlobalCandidate& b) { return a.score > b.score; });
+  sort_stably(candidates,
+              [](const GlobalCandidate& a, const GlobalCandidate& b) { return a.score > b.score; });
 }
 
 // Of poses that are the same the first stays.

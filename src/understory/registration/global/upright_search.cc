@@ -9,6 +9,7 @@
 #include "understory/geometry/plane/plane_grid.h"
 #include "understory/registration/global/global_constants.h"
 #include "understory/util/median.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -121,8 +122,7 @@ std::vector<PlaneStart> MotionVotes::fullest(std::size_t most) const {
       }
     }
   }
-  std::stable_sort(cells.begin(), cells.end(),
-                   [](const Cell& a, const Cell& b) { return a.sum > b.sum; });
+  sort_stably(cells, [](const Cell& a, const Cell& b) { return a.sum > b.sum; });
   std::vector<Cell> kept;
   for (const Cell& cell : cells) {
     if (kept.size() >= most) break;
@@ -279,8 +279,8 @@ std::vector<UprightMatch> match_uprights(const std::vector<Upright>& target,
     const UprightMatch match = fitted(grid, target, source, motion);
     if (match.matched >= 2) matches.push_back(match);
   }
-  std::stable_sort(matches.begin(), matches.end(),
-                   [](const UprightMatch& a, const UprightMatch& b) { return a.score > b.score; });
+  sort_stably(matches,
+              [](const UprightMatch& a, const UprightMatch& b) { return a.score > b.score; });
   std::vector<UprightMatch> kept;
   for (const UprightMatch& match : matches) {
     if (kept.size() >= most) break;

@@ -9,6 +9,7 @@
 #include "understory/registration/registration_constants.h"
 #include "understory/util/error.h"
 #include "understory/util/parallel.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -61,8 +62,7 @@ std::vector<std::size_t> sharp_points(const Points& ring, const std::vector<doub
     if (hidden[i] == 0 && std::isfinite(smoothness[i]) && smoothness[i] > config.edge_smoothness)
       sharp.push_back(i);
   }
-  std::stable_sort(sharp.begin(), sharp.end(),
-                   [&](auto a, auto b) { return smoothness[a] > smoothness[b]; });
+  sort_stably(sharp, [&](auto a, auto b) { return smoothness[a] > smoothness[b]; });
   return sharp;
 }
 

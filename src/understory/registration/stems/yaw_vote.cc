@@ -1,6 +1,7 @@
 #include "understory/registration/stems/yaw_vote.h"
 #include "understory/registration/registration_constants.h"
 #include "understory/util/median.h"
+#include "understory/util/stable_sort.h"
 
 #include <algorithm>
 #include <cmath>
@@ -128,8 +129,7 @@ std::vector<YawVoteCandidate> vote_yaw(const SparseTarget& target, const SparseP
     const double yaw = k * step;
     peaks.push_back(vote(target.grid, turn(source, guess, yaw), yaw, height, ballot));
   }
-  std::stable_sort(peaks.begin(), peaks.end(),
-                   [](const Peak& a, const Peak& b) { return a.votes > b.votes; });
+  sort_stably(peaks, [](const Peak& a, const Peak& b) { return a.votes > b.votes; });
   std::vector<Peak> chosen;
   for (const Peak& peak : peaks) {
     if (static_cast<int>(chosen.size()) >= config.candidates) break;
