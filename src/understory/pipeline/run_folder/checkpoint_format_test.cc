@@ -52,7 +52,7 @@ TEST(CheckpointFormat, GrowsWithWhatIsKept) {
   EXPECT_EQ(saved(Recovery(30)), 108U);
   EXPECT_EQ(saved(CarriedReturns(CarriedReturnsConfig())), 20U);
   EXPECT_EQ(saved(LoopCloser(LoopCloserConfig(), LocalMapConfig())), 17U);
-  EXPECT_EQ(saved(SatelliteBelief(SatelliteBeliefConfig(), 0.1)), 1U);
+  EXPECT_EQ(saved(SatelliteBelief(SatelliteBeliefConfig(), 0.1)), 221758U);
   EXPECT_EQ(saved(ReturningKeyframes()), 16U);
   EXPECT_EQ(sizeof(DenseCounts), 184U);
   EXPECT_EQ(saved(FixJoiner()), 55U);
