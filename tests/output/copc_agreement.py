@@ -125,7 +125,8 @@ def check_our_reader(folder, laz_points):
         run("inventory", folder / name, "-o", at, "--set", "extent=basic")
         lists.append([line.split(",")[:6] for line in (at / "trees.csv").read_text().splitlines()])
     # The order of points decides on which of two nearby ones is kept, so not to the last digit.
-    assert len(lists[0]) == len(lists[1]) > 3, [len(rows) for rows in lists]
+    # A stem at the limit may be on either side.
+    assert abs(len(lists[0]) - len(lists[1])) <= 1 < 3 < len(lists[0]), [len(rows) for rows in lists]
 
 
 def check_refusals(folder, walk):
