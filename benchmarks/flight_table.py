@@ -13,15 +13,13 @@ is kept (`--keep`), so that a table that was stopped goes on where it was. Needs
 """
 
 import argparse
-import json
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from figures.data import enu, origin_of, paired, read_path, read_table, rms
-from program import TOP, digest, machine, map_recording, say, understory, understory_json, version
+from figures.data import enu, origin_of, paired, read_path, rms
+from program import TOP, KeptRows, digest, machine, map_recording, say, understory, understory_json, version
 
 PAGE = TOP / "docs" / "method" / "odometry.md"
 BEGIN, END = "<!-- flights table: ./run accuracy --flights --write -->", "<!-- end of flights table -->"
@@ -109,7 +107,7 @@ def main():
     parser = argparse.ArgumentParser(prog="./run accuracy --flights", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sites", nargs="+", default=["lohja1", "lohja2"])
-    parser.add_argument("--seeds", type=int, nargs="+", default=[47])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[48])
     parser.add_argument("--points", nargs="+", choices=POINTS, default=list(POINTS))
     parser.add_argument("--gnss", nargs="+", choices=WAYS, default=list(WAYS))
     parser.add_argument("--cut", type=float, nargs=2, default=[40.0, 100.0], metavar=("FROM", "TO"))
@@ -117,24 +115,20 @@ def main():
     parser.add_argument("--keep", type=Path, help="recordings, runs and rows stay here")
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
-    work = options.keep or Path(tempfile.mkdtemp(prefix="understory-flights-"))
-    work.mkdir(parents=True, exist_ok=True)
-    file = work / "rows.jsonl"
-    known = {row["key"]: row for row in map(json.loads, file.read_text().splitlines())} if file.exists() else {}
-    rows = []
+    kept, rows = KeptRows(options.keep, "flights"), []
     for site in options.sites:
         for seed in options.seeds:
             for points in options.points:
                 for way in options.gnss:
                     settings, cut = WAYS[way]
                     cut = options.cut if cut else None
-                    key = f"{digest()} {site} {seed} {options.seconds:g} {points} {way} {cut}"
-                    if key not in known:
-                        recording = recorded(work, site, seed, options.seconds, cut)
-                        known[key] = measured(work, recording, "run", (*POINTS[points], *settings)) | {"key": key}
-                        with open(file, "a", encoding="utf-8") as to:
-                            to.write(json.dumps(known[key]) + "\n")
-                    rows.append(row_of(site, seed, points, way, known[key]))
+
+                    def make():
+                        recording = recorded(kept.folder, site, seed, options.seconds, cut)
+                        return measured(kept.folder, recording, "run", (*POINTS[points], *settings))
+
+                    found = kept.get(f"{site} {seed} {options.seconds:g} {points} {way} {cut}", make)
+                    rows.append(row_of(site, seed, points, way, found))
                     say(rows[-1])
     rule = "|" + "---|" * (HEAD.count("|") - 1)
     part = f"the first {options.seconds:g} s" if options.seconds else "whole flights"

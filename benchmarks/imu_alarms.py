@@ -20,10 +20,9 @@ import json
 import random
 import re
 import sys
-import tempfile
 from pathlib import Path
 
-from program import DONE, PROGRAM, UNTRUSTED, digest, machine, map_recording, run, say, simulated, understory, version
+from program import DONE, PROGRAM, UNTRUSTED, KeptRows, machine, map_recording, run, say, simulated, understory, version
 from spoil import IMU_WORDS, WAYS, read_mcap, whole, write_mcap
 
 GOOD_SITES = ["handheld", "harvester", "evo1", "evo2", "evo3", "tuusniemi1", "tuusniemi3", "lohja1", "lohja2", "hover",
@@ -83,21 +82,6 @@ def wrong(work, walks, site, seed, name):
             "found": bool(said) or any(re.search(way.cause, text) for text in texts)}
 
 
-class Rows:
-    def __init__(self, work):
-        self.file = work / "rows.jsonl"
-        lines = self.file.read_text().splitlines() if self.file.exists() else []
-        self.rows = {row["key"]: row for row in map(json.loads, lines)}
-
-    def get(self, key, make):
-        key = f"{digest()} {key}"
-        if key not in self.rows:
-            self.rows[key] = make() | {"key": key}
-            with open(self.file, "a", encoding="utf-8") as to:
-                to.write(json.dumps(self.rows[key]) + "\n")
-        return self.rows[key]
-
-
 def main():
     parser = argparse.ArgumentParser(prog="./run accuracy --imu-alarms", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -108,9 +92,8 @@ def main():
     parser.add_argument("--only", choices=["good", "wrong"])
     parser.add_argument("--keep", type=Path)
     options = parser.parse_args()
-    work = options.keep or Path(tempfile.mkdtemp(prefix="understory-imu-"))
-    work.mkdir(parents=True, exist_ok=True)
-    rows, alarms, missed, counts = Rows(work), [], [], [0, 0]
+    rows, alarms, missed, counts = KeptRows(options.keep, "imu"), [], [], [0, 0]
+    work = rows.folder
     print(f"{version()}, {machine()}")
     if options.only != "wrong":
         for site in options.sites:

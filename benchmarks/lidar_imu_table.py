@@ -16,12 +16,11 @@ import argparse
 import json
 import random
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from program import PROGRAM, digest, machine, run, say, understory, version
+from program import PROGRAM, KeptRows, machine, run, understory, version
 
 SETTINGS = ("lidar.model=VLP-16", "gnss.enabled=false")
 TRUE_PLACE = np.array([0.0, 0.0, -0.06])  # of the IMU in the lidar's frame, by the site; no turn
@@ -96,19 +95,10 @@ def main():
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--keep", type=Path)
     options = parser.parse_args()
-    work = options.keep or Path(tempfile.mkdtemp(prefix="understory-lidar-imu-"))
-    work.mkdir(parents=True, exist_ok=True)
-    file = work / "rows.jsonl"
-    known = {row["key"]: row for row in map(json.loads, file.read_text().splitlines())} if file.exists() else {}
-    rows = []
+    kept, rows = KeptRows(options.keep, "lidar-imu"), []
     print(f"{version()}, {machine()}, walks of {options.seconds:g} s")
     for seed in options.seeds:
-        key = f"{digest()} {seed} {options.seconds:g}"
-        if key not in known:
-            known[key] = measured(work, seed, options.seconds) | {"key": key}
-            with open(file, "a", encoding="utf-8") as to:
-                to.write(json.dumps(known[key]) + "\n")
-        rows.append(known[key])
+        rows.append(kept.get(f"{seed} {options.seconds:g}", lambda: measured(kept.folder, seed, options.seconds)))
         row = rows[-1]
         if "errors" not in row:
             print(f"seed {seed}: exit {row['code']}, {row['said']}", flush=True)

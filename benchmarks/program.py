@@ -6,6 +6,7 @@ import os
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -89,6 +90,26 @@ def version():
 def digest():
     """What tells one build of the program from another where the version is the same."""
     return hashlib.sha256(PROGRAM.read_bytes()).hexdigest()[:12]
+
+
+class KeptRows:
+    """The rows of a table in a folder, so that a command that was stopped goes on where it was. Each
+    has the program's digest in its key. Without a folder they are kept in one of their own."""
+
+    def __init__(self, folder, name):
+        self.folder = Path(folder or tempfile.mkdtemp(prefix=f"understory-{name}-"))
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.file = self.folder / "rows.jsonl"
+        lines = self.file.read_text().splitlines() if self.file.exists() else []
+        self.rows = {row["key"]: row for row in map(json.loads, lines)}
+
+    def get(self, key, make):
+        key = f"{digest()} {key}"
+        if key not in self.rows:
+            self.rows[key] = make() | {"key": key}
+            with open(self.file, "a", encoding="utf-8") as to:
+                to.write(json.dumps(self.rows[key]) + "\n")
+        return self.rows[key]
 
 
 def machine():
