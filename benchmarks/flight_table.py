@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """`./run accuracy --flights`: table 1 of P2, errors of whole flights without GNSS, with it, and with it cut.
 
-  ./run accuracy --flights                        lohja1 and lohja2, seed 47, all points and tree tops
+  ./run accuracy --flights                        lohja1 and lohja2, seed 48, all points and tree tops
   ./run accuracy --flights --seeds 3 --cut 40 100    GNSS silent from 40 to 100 s of the recording
   ./run accuracy --flights --seconds 60           only the first minute
   ./run accuracy --flights --write                puts the table into docs/method/odometry.md

@@ -43,6 +43,26 @@ TEST(HiddenStems, AStemHiddenAroundBreastHeightIsMeasuredAbove) {
     EXPECT_TRUE(std::isnan(tree.dbh_m));
 }
 
+// A slim thing that ends where its heights are seen is a branch or a sign, not a stem.
+TEST(HiddenStems, WhatHangsAndEndsIsNone) {
+  for (const double top_m : {4.95, 6.0}) {
+    TestPlot plot(15);
+    plot.add_ground(12.0, 40);
+    Random random(4);
+    for (int i = 0; i < 900; ++i) {
+      const double h = random.uniform(3.4, top_m);
+      const double turn = random.uniform(0.0, 2.0 * M_PI);
+      const double r = 0.05 + random.normal(0.0, 0.012);
+      plot.cloud.emplace_back(6.0 + r * std::cos(turn), 6.0 + r * std::sin(turn),
+                              plot.ground(6.0, 6.0) + h);
+    }
+    int stems = 0;
+    for (const Tree& tree : take_inventory(blocks_of(plot.cloud), {}).trees)
+      stems += std::isfinite(tree.dbh_m) ? 1 : 0;
+    EXPECT_EQ(stems, top_m > 5.0 ? 1 : 0) << top_m;
+  }
+}
+
 // A stem behind something shows only from 2.6 or 3.4 m on. Nothing lies below: a bush there would
 // be what is seen.
 TEST(HiddenStems, AStemWhoseFootIsHiddenIsListedWithWhatItsTaperMayDiffer) {

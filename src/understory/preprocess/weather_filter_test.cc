@@ -56,6 +56,9 @@ TEST(WeatherFilter, JudgesScansWithIntensitiesWhereItIsEnabled) {
   EXPECT_TRUE(WeatherFilter(switched_on()).judges(scan));
   EXPECT_FALSE(WeatherFilter({}).judges(scan));
   EXPECT_FALSE(WeatherFilter(switched_on()).judges(Scan()));
+  for (ScanPoint& point : scan.points)
+    point.intensity = std::nanf("");
+  EXPECT_FALSE(WeatherFilter(switched_on()).judges(scan)) << "intensities that are no numbers";
 }
 
 TEST(WeatherFilter, DarkReturnsThatStandAloneGoAndNothingElse) {

@@ -190,8 +190,7 @@ bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig&
       e.even_arc_deg < kEvenArcOfLeast * config.min_arc_deg) {
     return false;
   }
-  const bool clear = is_clear_column(fit, config, std::sqrt(std::max(0.0, stem.covariance(2, 2))));
-  if (clear) return true;
+  if (is_clear_column(fit, config, std::sqrt(std::max(0.0, stem.covariance(2, 2))))) return true;
   if (cut.only_clear) return reaches_top(stem, config) && stands_alone(fit, config);
   if (e.even_arc_deg < kEvenArcShare * stem.arc_deg) return false;
   // What begins higher is a branch or a crown.
@@ -466,6 +465,8 @@ std::vector<StemFit> detect_hidden_stems(
   std::vector<StemFit> stems;
   for (std::size_t i = known.size(); i < search.stems.size(); ++i) {
     StemFit stem = seen_from_below(search.stems[i], rise);
+    const double dbh = 2.0 * stem.radius_m;
+    if (dbh < config.min_dbh_m || dbh > config.max_dbh_m) continue;
     if (where.area.contains(stem.centre)) stems.push_back(std::move(stem));
   }
   return stems;

@@ -55,13 +55,12 @@ struct StemFit {
   double taper = 0.0;     // of the radius per metre of height (negative: thinner upwards)
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();       // of centre x, y and radius
   Eigen::Matrix2d foot_covariance = Eigen::Matrix2d::Zero();  // of the centre line at the ground
-  double spread_m = 0.0;  // of the radius, if returns were independent; see diameter_sd_m
-  // Of the radius, one standard deviation: how the taper may differ below what was seen.
-  double below_sd_m = 0.0;
-  double rms_m = 0.0;     // of the points on the surface
-  double arc_deg = 0.0;   // covered by points
-  int returns = 0;        // of the cloud
-  double lowest_m = 0.0;  // first and last height with points on the surface
+  double spread_m = 0.0;    // of the radius, if returns were independent; see diameter_sd_m
+  double below_sd_m = 0.0;  // of the radius: how the taper may differ below what was seen
+  double rms_m = 0.0;       // of the points on the surface
+  double arc_deg = 0.0;     // covered by points
+  int returns = 0;          // of the cloud
+  double lowest_m = 0.0;    // first and last height with points on the surface
   double highest_m = 0.0;
   BeamFootprint beam;          // of the beams that met it, where they are known
   double beam_excess_m = 0.0;  // what these added to the radius, and was taken away from it

@@ -101,7 +101,8 @@ class SatelliteBelief {
       const Eigen::Quaterniond& level_from_world = Eigen::Quaterniond::Identity()) const;
   // Of a penalty: the heading by the second antenna alone, for a term of its own; it counts while
   // the carrier stands, too. Its points lie far away, so that where the antenna is counts nothing.
-  // Nothing where at() says nothing of the kind, and where the two antennas contradict the map.
+  // Nothing without a fresh heading, where the form has one point, and where the two antennas
+  // contradict the map.
   [[nodiscard]] std::optional<PoseBelief> heading_at(const StampedPose& predicted) const;
 
   // The whole state, bit for bit. `load` into one with the same configuration.

@@ -186,7 +186,8 @@ class KeyframeMap {
   bool told_of_radius_ = false;
   std::vector<char> loops_used_;
   LoopCloser loops_;
-  std::future<void> giving_back_;  // see give_back()
+  // What give_back() has begun.
+  std::future<void> giving_back_;
 };
 
 }  // namespace understory

@@ -106,6 +106,22 @@ TEST_F(CopcWriterTest, OurReaderFindsTheSamePointsAsInTheLaz) {
   EXPECT_EQ(rows(copc), rows(laz));
 }
 
+// Readers take the cube from its centre and half of its side, which are rounded.
+TEST_F(CopcWriterTest, TheCubeHoldsTheLowestPointFarFromTheOrigin) {
+  for (int i = 0; i < 20; ++i) {
+    LasOptions options;
+    options.offset = {385'000.0 + 0.137 * i, 6'672'000.0 + 1'003.71 * i, 120.0 + 0.3 * i};
+    const std::string name = "cube" + std::to_string(i) + ".copc.laz";
+    const std::string file = bytes_of(written(name, 500, options, kSmall));
+    const auto half = number_at<double>(file, 375 + 54 + 24);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto centre = number_at<double>(file, 375 + 54 + 8 * axis);
+      EXPECT_GE(number_at<double>(file, 187 + 16 * axis), centre - half) << i << " " << axis;
+      EXPECT_LE(number_at<double>(file, 179 + 16 * axis), centre + half) << i << " " << axis;
+    }
+  }
+}
+
 TEST_F(CopcWriterTest, TheHeaderAndTheHierarchySayWhereThingsAre) {
   const std::filesystem::path path = written("map.copc.laz", 40'000, {}, kSmall);
   const std::string file = bytes_of(path);
