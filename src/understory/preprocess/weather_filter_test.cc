@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "understory/util/parallel.h"
@@ -56,8 +57,8 @@ TEST(WeatherFilter, JudgesScansWithIntensitiesWhereItIsEnabled) {
   EXPECT_TRUE(WeatherFilter(switched_on()).judges(scan));
   EXPECT_FALSE(WeatherFilter({}).judges(scan));
   EXPECT_FALSE(WeatherFilter(switched_on()).judges(Scan()));
-  for (ScanPoint& point : scan.points)
-    point.intensity = std::nanf("");
+  scan.points[0].intensity = std::nanf("");
+  scan.points[1].intensity = std::numeric_limits<float>::infinity();
   EXPECT_FALSE(WeatherFilter(switched_on()).judges(scan)) << "intensities that are no numbers";
 }
 

@@ -85,7 +85,9 @@ TEST(ReturningKeyframes, AMapMadeAnewHoldsAllWithinItsRadius) {
   way.returning.note_made_anew(in_map);
   EXPECT_TRUE(way.returning.take(way.keyframes, 0, kRadiusM).empty());
   way.returning.note_made_anew({});
-  EXPECT_EQ(way.returning.take(way.keyframes, 0, kRadiusM).front(), 10U) << "what it lacks comes";
+  const std::vector<std::size_t> lacking = way.returning.take(way.keyframes, 0, kRadiusM);
+  ASSERT_FALSE(lacking.empty()) << "what it lacks comes";
+  EXPECT_EQ(lacking.front(), 10U);
 }
 
 TEST(ReturningKeyframes, GoOnFromTheirState) {
