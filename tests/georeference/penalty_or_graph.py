@@ -16,8 +16,7 @@ SECONDS = 40
 # RTK all the way, and the receiver of the site: it errs by decimetres for a minute.
 RTK = simulated("skidoo", 5, SECONDS, "gnss.canopy_sd_m=0.03", "gnss.jump_interval_s=0")
 UNDER_TREES = simulated("skidoo", 5, SECONDS)
-TWO_ANTENNAS = simulated("skidoo", 5, SECONDS, "gnss.canopy_sd_m=0.03", "gnss.jump_interval_s=0",
-                         "gnss.second_antenna_m=[0.9,0,0]", "gnss.heading_sd_deg=0.2")
+TWO_ANTENNAS = simulated("skidoo", 5, SECONDS, "gnss.second_antenna_m=[0.9,0,0]", "gnss.heading_sd_deg=0.2")
 
 
 def mapped(recording, folder, *settings):
@@ -56,7 +55,7 @@ def none_spoils(folder):
     bare = found["none"]
     for way, one in found.items():
         # Fixes are good to 3 to 6 cm in the plane, and to 6 to 11 cm in height.
-        assert one["ape_rmse_m"] < bare["ape_rmse_m"] + 0.06, (way, one["ape_rmse_m"], bare["ape_rmse_m"])
+        assert way == "none" or one["ape_rmse_m"] < 0.7 * bare["ape_rmse_m"], (way, one["ape_rmse_m"], bare["ape_rmse_m"])
         assert one["ape_rotation_rmse_deg"] < 0.5, (way, one["ape_rotation_rmse_deg"])
         assert TOLD[way]["status"] == "complete", (way, TOLD[way])
     return ", ".join(f"{way} {100 * one['ape_rmse_m']:.1f} cm" for way, one in found.items())
@@ -70,15 +69,18 @@ def under_trees(folder):
     return ", ".join(f"{way} {100 * error:.1f} cm" for way, error in found.items())
 
 
-@cases.case("a second antenna is a prior of the heading in the match")
+@cases.case("a second antenna is a prior of the heading in the match, also where fixes are free")
 def second_antenna(folder):
-    plain, other = TOLD["penalty"], mapped(TWO_ANTENNAS, folder / "two", *WAYS["penalty"])
+    told = {name: mapped(recording, folder / name, *WAYS["penalty"])
+            for name, recording in (("one", UNDER_TREES), ("two", TWO_ANTENNAS))}
     # The first stretch ends sooner, since its heading is known while the sleigh stands.
-    assert other["quality"]["gnss_match_from_s"] <= plain["quality"]["gnss_match_from_s"], (plain, other)
-    found = errors(TWO_ANTENNAS, folder / "two")
-    assert found["ape_rotation_rmse_deg"] < 0.5, found
-    assert other["counts"]["scans_by_satellites"] >= plain["counts"]["scans_by_satellites"], (plain, other)
-    return f"from {other['quality']['gnss_match_from_s']:.1f} s, without from {plain['quality']['gnss_match_from_s']:.1f} s"
+    begins = {name: one["quality"]["gnss_match_from_s"] for name, one in told.items()}
+    assert begins["two"] <= begins["one"], begins
+    # Under trees most fixes say no place. The heading counts at each scan.
+    share = {name: one["counts"]["scans_by_satellites"] / (one["scans"] - 10 * begins[name]) for name, one in told.items()}
+    assert share["two"] > 0.95 > 0.8 > share["one"], share
+    assert errors(TWO_ANTENNAS, folder / "two")["ape_rotation_rmse_deg"] < 0.5
+    return f"{100 * share['two']:.0f} % of the scans, without {100 * share['one']:.0f} %"
 
 
 cases.run()
