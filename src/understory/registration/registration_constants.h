@@ -109,12 +109,20 @@ inline constexpr double kLeastShare = 0.3;
 inline constexpr double kLeastScale = 0.01;
 }  // namespace robust_loss
 
-namespace ring_features {  // registration/loam/ring_features.cc
+namespace ring_features {  // registration/loam/ring_features.cc, ring_clusters.cc
 // Directions in which the slope from ring to ring is found; 0.2 degrees [chosen: about a column of
 // an Ouster with 2048 or a VLP-16 with 1800]
 inline constexpr std::size_t kAzimuthBins = 1800;
+// Columns to each side in which the neighbour of a point is looked for [chosen: lidars with 1024
+// columns leave every second one empty]
+inline constexpr std::size_t kColumnGap = 3;
 // m: smoothness divides by the range [bound: no lidar measures nearer]
 inline constexpr double kLeastRange = 0.1;
+// A cluster with fewer points than are asked for counts with so many of them ... [source: the
+// program of the authors of LeGO-LOAM, 2018]
+inline constexpr std::size_t kUprightPoints = 5;
+// ... on so many rings: a post, a far stem [source: as above]
+inline constexpr std::size_t kUprightRings = 3;
 }  // namespace ring_features
 
 namespace solve {  // registration/solve.cc

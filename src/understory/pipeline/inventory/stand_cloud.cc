@@ -168,8 +168,9 @@ void refuse_rounded(const PointCloudFile& cloud, const std::string& name, const 
 void warn_of_lost(const PointCloudFile& cloud, std::uint64_t kept, const std::string& name,
                   Log& log) {
   if (cloud.not_finite == 0) return;
-  log.warn("inventory.not_numbers", fmt::format("{}: {} of {} points are not numbers; left out",
-                                                name, cloud.not_finite, cloud.not_finite + kept));
+  log.warn("inventory.not_numbers",
+           fmt::format("{}: {} of {} points have no usable coordinates; left out", name,
+                       cloud.not_finite, cloud.not_finite + kept));
 }
 
 // Reads the cloud in one piece or into tiles, moved. `layers`: of a run, null for another cloud.

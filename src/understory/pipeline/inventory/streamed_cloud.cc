@@ -72,7 +72,7 @@ class Sorter {
       : cloud_(cloud), change_(changes.first), moves_(changes.moves) {}
 
   void add(const Eigen::Vector3d& position, float intensity, double gps_time) {
-    if (!position.allFinite()) {
+    if (!is_place(position)) {
       ++cloud_.about.not_finite;
       return;
     }

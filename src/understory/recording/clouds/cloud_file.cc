@@ -18,15 +18,17 @@ namespace {
 
 // Beyond this a float keeps less than a tenth of a millimetre.
 constexpr double kFarFromOrigin = 1000.0;
+// In millimetres the Earth's coordinates, of UTM, too, reach to 1e10.
+constexpr double kFarthestPlace = 1e10;
 
 // Appends points and settles the origin with the first one.
 class Collector {
  public:
   Collector(PointCloudFile& cloud, const PlaceChange& change) : cloud_(cloud), change_(change) {}
 
-  // False if the point is NaN or infinite.
+  // False if the point is no place.
   bool add(const Eigen::Vector3d& position) {
-    if (!position.allFinite()) {
+    if (!is_place(position)) {
       ++cloud_.not_finite;
       return false;
     }
@@ -101,6 +103,10 @@ PointCloudFile from_table(const CloudTable& table, const std::string& name,
 }
 
 }  // namespace
+
+bool is_place(const Eigen::Vector3d& position) {
+  return position.allFinite() && position.cwiseAbs().maxCoeff() <= kFarthestPlace;
+}
 
 Eigen::Vector3d cloud_origin(const Eigen::Vector3d& first) {
   if (first.cwiseAbs().maxCoeff() <= kFarFromOrigin) return Eigen::Vector3d::Zero();

@@ -30,8 +30,12 @@ struct PointCloudFile {
   // Distance of neighbouring numbers at the first point, in which a file of single precision holds
   // its coordinates; 0: it holds them in double precision.
   double step = 0.0;
-  std::uint64_t not_finite = 0;  // points that were left out
+  std::uint64_t not_finite = 0;  // points that were left out: no places (is_place)
 };
+
+// Whether this can be a place: finite, and at most 1e10 from zero, which holds the Earth in
+// millimetres. Some programs write a number like 1e30 where a beam met nothing.
+[[nodiscard]] bool is_place(const Eigen::Vector3d& position);
 
 // The origin of a cloud whose first point lies here: zero, or a round place near it.
 [[nodiscard]] Eigen::Vector3d cloud_origin(const Eigen::Vector3d& first);
@@ -49,8 +53,9 @@ struct E57Header;
 // From the frame of a file into another, in double precision.
 using PlaceChange = std::function<Eigen::Vector3d(const Eigen::Vector3d&)>;
 
-// Reads .las, .laz, .e57, .pcd, .ply or KITTI .bin (told by content, .bin by name). Points that are
-// NaN or infinite are left out. A file that breaks off gives the points up to there and a warning
+// Reads .las, .laz, .e57, .pcd, .ply or KITTI .bin (told by content, .bin by name). Points that
+// are no places (is_place) are left out. A file that breaks off gives the points up to there and a
+// warning
 // ("recording.damaged"); throws InputError if no point can be had from it. Of LAS, LAZ and E57
 // each point polls `progress`. With `change`, points and origin are in the frame that it leads to.
 [[nodiscard]] PointCloudFile read_cloud(const std::string& path, Log& log,

@@ -232,6 +232,18 @@ TEST(CloudFile, LeavesOutNan) {
   EXPECT_EQ(read(bytes, log).points.size(), kPoints - 1U);
 }
 
+// A regression: the origin was the first point, so all others lost their places.
+TEST(CloudFile, LeavesOutWhatIsFartherThanAnyPlace) {
+  const std::string text =
+      "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3\n"
+      "HEIGHT 1\nPOINTS 3\nDATA ascii\n1e30 0 0\n1 2 3\n6800000000 2 3\n";
+  Log log;
+  const PointCloudFile cloud = read(Bytes(text.begin(), text.end()), log);
+  EXPECT_EQ(cloud.not_finite, 1U);
+  ASSERT_EQ(cloud.points.size(), 2U);
+  EXPECT_EQ(cloud.points.front(), Eigen::Vector3f(1, 2, 3));
+}
+
 TEST(Lzf, RefusesReferencesBeforeTheStart) {
   std::vector<std::uint8_t> out(10);
   std::size_t made = 0;

@@ -83,10 +83,9 @@ class LoamMatchTarget : public MatchTarget {
     int iterations = 0;
     for (std::size_t i = start == MatchStart::kFar ? 0 : stages_.size() - 1; i < stages_.size();
          ++i) {
-      result = ground_
-                   ? in_two_steps(stages_[i], source, result.target_from_source, terms)
-                   : internal::gaussian_match(*stages_[i].target, loam_source(source, kAllKinds),
-                                              result.target_from_source, terms, stages_[i].steps);
+      const Pose from = result.target_from_source;
+      result = ground_ ? in_two_steps(stages_[i], source, from, terms)
+                       : at_once(stages_[i], source, from, terms);
       iterations += result.iterations;
       if (!result.usable()) break;
     }
@@ -125,37 +124,33 @@ class LoamMatchTarget : public MatchTarget {
         {steps.max_iterations, steps.step_translation_m, steps.step_rotation_rad, steps.max_step_m,
          internal::mean_range(source.means)});
   }
-  // Ground, then edges, until a round moves the pose by less than a step that counts. The verdict
-  // is that of all features together.
+  static RegistrationResult at_once(const LoamStage& stage, const FeaturePoints& cloud,
+                                    const Pose& guess, const PoseTerms& terms) {
+    return internal::gaussian_match(*stage.target, loam_source(cloud, kAllKinds), guess, terms,
+                                    stage.steps);
+  }
+  // Ground, then edges, until a round moves the pose by less than a step that counts. From there
+  // all features are matched at once, as LeGO-LOAM matches them to its map (section III.E).
   [[nodiscard]] RegistrationResult in_two_steps(const LoamStage& stage, const FeaturePoints& cloud,
                                                 const Pose& guess, const PoseTerms& terms) const {
     const GaussianStepsConfig& steps = stage.steps;
-    const GaussianSource all = loam_source(cloud, kAllKinds);
-    const auto least = static_cast<std::size_t>(steps.min_matches);
-    if (stage.target->size() < least || all.means.size() < least) {
-      return internal::refused(RegistrationStatus::kTooFewPoints,
-                               "only " + std::to_string(all.means.size()) + " source and " +
-                                   std::to_string(stage.target->size()) + " target features",
-                               guess);
-    }
     const GaussianSource ground = loam_source(cloud, kGroundAlone);
     const GaussianSource edges = loam_source(cloud, kEdgesAlone);
-    internal::Minimum minimum{guess, {}, 0, false};
-    for (int round = 0; round < config_.rounds && !minimum.converged; ++round) {
-      const internal::Minimum low = one_step(stage, ground, minimum.pose, terms, true);
+    Pose pose = guess;
+    int iterations = 0;
+    bool settled = false;
+    for (int round = 0; round < config_.rounds && !settled; ++round) {
+      const internal::Minimum low = one_step(stage, ground, pose, terms, true);
       const internal::Minimum level = one_step(stage, edges, low.pose, terms, false);
-      const Vector6d moved = right_difference(level.pose, minimum.pose);
-      minimum.pose = level.pose;
-      minimum.iterations += low.iterations + level.iterations;
-      // Between rounds the steps settle by what ground and edges tell of each other.
-      minimum.converged = moved.tail<3>().norm() < kSettled * steps.step_translation_m &&
-                          moved.head<3>().norm() < kSettled * steps.step_rotation_rad;
-      if (round + 1 == config_.rounds && low.converged && level.converged) minimum.converged = true;
+      const Vector6d moved = right_difference(level.pose, pose);
+      pose = level.pose;
+      iterations += low.iterations + level.iterations;
+      settled = moved.tail<3>().norm() < kSettled * steps.step_translation_m &&
+                moved.head<3>().norm() < kSettled * steps.step_rotation_rad;
     }
-    std::vector<LoamTarget::Known> known(all.means.size());
-    const MatchSums at = internal::gaussian_sums(*stage.target, all, minimum.pose, steps, known);
-    return internal::judged_match(minimum, at, all.means, internal::mean_range(all.means), guess,
-                                  internal::Judgement(steps));
+    RegistrationResult result = at_once(stage, cloud, pose, terms);
+    result.iterations += iterations;
+    return result;
   }
 
   static constexpr double kSettled = 5.0;  // steps
@@ -171,14 +166,15 @@ IcpMapConfig feature_map(const LoamConfig& config) {
   return map;
 }
 
-// Edges and planes each have a map of their own.
+// Edges, planes and, with `ground`, ground each have a map of their own.
 class LoamTargetBuilder : public TargetBuilder {
  public:
   LoamTargetBuilder(const LoamConfig& config, bool ground)
       : config_(config),
         ground_(ground),
         edges_(feature_map(config)),
-        planes_(feature_map(config)) {}
+        planes_(feature_map(config)),
+        ground_planes_(feature_map(config)) {}
 
   // Points without features make no map.
   void insert(const Points& points_in_source, const Pose& target_from_source,
@@ -187,32 +183,34 @@ class LoamTargetBuilder : public TargetBuilder {
   }
   void insert_features(const FeaturePoints& cloud, const Pose& target_from_source,
                        std::optional<double> forget_beyond_m) override {
-    Points edges;
-    Points planes;
-    for (std::size_t i = 0; i < cloud.features.size(); ++i) {
-      if (cloud.features[i] == PointFeature::kNone) continue;
-      (cloud.features[i] == PointFeature::kEdge ? edges : planes).push_back(cloud.points[i]);
+    std::array<Points, kAllKinds.size()> kinds;
+    for (std::size_t i = 0; i < cloud.features.size(); ++i)
+      kinds[static_cast<std::size_t>(cloud.features[i])].push_back(cloud.points[i]);
+    for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
+      const auto feature = static_cast<PointFeature>(kind);
+      if (feature != PointFeature::kNone && !kinds[kind].empty())
+        map_of(feature).insert(kinds[kind], target_from_source);
     }
-    edges_.insert(edges, target_from_source);
-    planes_.insert(planes, target_from_source);
-    if (!forget_beyond_m) return;
-    edges_.remove_beyond(target_from_source.translation(), *forget_beyond_m);
-    planes_.remove_beyond(target_from_source.translation(), *forget_beyond_m);
+    if (forget_beyond_m) forget_beyond(target_from_source.translation(), *forget_beyond_m);
   }
   void forget_beyond(const Eigen::Vector3d& centre, double radius_m) override {
     edges_.remove_beyond(centre, radius_m);
     planes_.remove_beyond(centre, radius_m);
+    ground_planes_.remove_beyond(centre, radius_m);
   }
   void clear() override {
     edges_.clear();
     planes_.clear();
+    ground_planes_.clear();
   }
-  [[nodiscard]] double bytes() const override { return edges_.bytes() + planes_.bytes(); }
+  [[nodiscard]] double bytes() const override {
+    return edges_.bytes() + planes_.bytes() + ground_planes_.bytes();
+  }
   [[nodiscard]] MatchTargetPtr snapshot() override {
-    const IcpMapPtr edges = edges_.snapshot();
-    const IcpMapPtr planes = planes_.snapshot();
+    LoamMaps maps{edges_.snapshot(), planes_.snapshot(), nullptr};
+    maps.ground = ground_ ? ground_planes_.snapshot() : maps.planes;
     const auto stage = [&](const LoamConfig& config) {
-      return LoamStage{std::make_shared<LoamTarget>(edges, planes, config), config.steps};
+      return LoamStage{std::make_shared<LoamTarget>(maps, config), config.steps};
     };
     std::vector<LoamStage> stages;
     if (config_.far_distance_m > config_.max_distance_m) {
@@ -226,10 +224,16 @@ class LoamTargetBuilder : public TargetBuilder {
   }
 
  private:
+  IcpMapBuilder& map_of(PointFeature feature) {
+    if (feature == PointFeature::kEdge) return edges_;
+    return feature == PointFeature::kGround ? ground_planes_ : planes_;
+  }
+
   LoamConfig config_;
   bool ground_;
   IcpMapBuilder edges_;
   IcpMapBuilder planes_;
+  IcpMapBuilder ground_planes_;
 };
 
 class LoamMatcher : public Matcher {
@@ -293,7 +297,7 @@ bool rows_of(const Eigen::Matrix3f& covariance, bool edge, const LoamConfig& con
 bool LoamTarget::pair(const GaussianSource& source, std::size_t i, const Eigen::Vector3d& at,
                       const Eigen::Matrix3d& /*rotation*/, Known& known, GaussianPair& pair) const {
   const bool edge = source.features[i] == PointFeature::kEdge;
-  const IcpMap& map = edge ? *edges_ : *planes_;
+  const IcpMap& map = maps_.of(source.features[i]);
   IcpPair nearest;
   if (!map.nearest(at, config_.max_distance_m, nearest, known.search)) return false;
   if (known.of != known.search.spot) {
@@ -315,6 +319,7 @@ void describe(ConfigTable& table, LoamGroundMatcherConfig& config) {
   describe_loam(table, config.loam);
   table.add("ground_slope_deg", config.loam.features.ground_slope_deg, {0.0, 60.0}, "deg",
             "steepest ground from one ring to the next");
+  describe(table, config.loam.features.clusters);
   table.add("rounds", config.loam.rounds, {1, 50}, "",
             "times at most that ground and edges follow one another");
 }

@@ -57,8 +57,23 @@ void describe(ConfigTable& table, LoamGroundMatcherConfig& config);
 [[nodiscard]] std::vector<SuitedSetting> suited_settings(const LoamGroundMatcherConfig& config,
                                                          const ScanTraits& traits);
 
-// The maps of edges and planes with the distances of one stage; see
-// internal::GaussianAccumulator. The source has features.
+// What a map of features is made of. Ground meets ground alone with LeGO-LOAM's method (section
+// III.D); with LOAM `ground` is `planes`.
+struct LoamMaps {
+  IcpMapPtr edges;
+  IcpMapPtr planes;
+  IcpMapPtr ground;
+  [[nodiscard]] std::size_t size() const {
+    return edges->size() + planes->size() + (ground == planes ? 0 : ground->size());
+  }
+  [[nodiscard]] const IcpMap& of(PointFeature feature) const {
+    if (feature == PointFeature::kEdge) return *edges;
+    return feature == PointFeature::kGround ? *ground : *planes;
+  }
+};
+
+// The maps with the distances of one stage; see internal::GaussianAccumulator. The source has
+// features.
 class LoamTarget {
  public:
   static constexpr bool kExactGradient = false;
@@ -69,9 +84,8 @@ class LoamTarget {
     Eigen::Matrix3d rows = Eigen::Matrix3d::Zero();
   };
 
-  LoamTarget(IcpMapPtr edges, IcpMapPtr planes, const LoamConfig& config)
-      : edges_(std::move(edges)), planes_(std::move(planes)), config_(config) {}
-  [[nodiscard]] std::size_t size() const { return edges_->size() + planes_->size(); }
+  LoamTarget(LoamMaps maps, const LoamConfig& config) : maps_(std::move(maps)), config_(config) {}
+  [[nodiscard]] std::size_t size() const { return maps_.size(); }
   // Lines across and planes along their normal, in units of `sigma_m`: LOAM (2, 3).
   [[nodiscard]] bool pair(const GaussianSource& source, std::size_t i, const Eigen::Vector3d& at,
                           const Eigen::Matrix3d& rotation, Known& known, GaussianPair& pair) const;
@@ -81,8 +95,7 @@ class LoamTarget {
   [[nodiscard]] double noise_m2() const { return config_.steps.sigma_m * config_.steps.sigma_m; }
 
  private:
-  IcpMapPtr edges_;
-  IcpMapPtr planes_;
+  LoamMaps maps_;
   LoamConfig config_;
 };
 

@@ -297,7 +297,8 @@ TEST(Loam, EdgesCountAcrossTheirLineAndPlanesAlongTheirNormal) {
   planes.insert(floor, Pose());
   LoamConfig config;
   config.steps.loss.kind = LossKind::kNone;
-  const LoamTarget target(edges.snapshot(), planes.snapshot(), config);
+  const IcpMapPtr floor_map = planes.snapshot();
+  const LoamTarget target({edges.snapshot(), floor_map, floor_map}, config);
   GaussianSource source;
   source.means = {{1.325F, 2.225F, 2.0F}, {0.5F, 0.5F, 0.13F}};
   source.features = {PointFeature::kEdge, PointFeature::kPlane};

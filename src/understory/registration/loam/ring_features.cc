@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <optional>
 
 #include "understory/registration/registration_constants.h"
 #include "understory/util/error.h"
@@ -90,39 +89,21 @@ std::vector<PointFeature> features_of(const Points& ring, const RingFeaturesConf
   return features;
 }
 
-// Points of a ring by azimuth: the last one measured in each bin, or nothing.
-using Azimuths = std::vector<std::optional<std::uint32_t>>;
-Azimuths by_azimuth(const Points& points, const Ring& ring) {
-  Azimuths bins(kAzimuthBins);
-  for (const std::uint32_t i : ring) {
-    const double azimuth =
-        std::atan2(static_cast<double>(points[i].y()), static_cast<double>(points[i].x()));
-    const double share = 0.5 + 0.5 * azimuth / std::numbers::pi;
-    bins[std::min(static_cast<std::size_t>(share * kAzimuthBins), kAzimuthBins - 1)] = i;
-  }
-  return bins;
-}
-
 // Which points lie on ground, by the slope from each ring to the next one with points.
-std::vector<char> ground_points(const Points& points, const std::vector<Ring>& rings,
-                                double slope_deg) {
+std::vector<char> ground_points(const Points& points, const RangeImage& image, double slope_deg) {
   std::vector<char> ground(points.size(), 0);
   const double most = std::tan(slope_deg * std::numbers::pi / 180.0);
-  std::optional<Azimuths> below;
-  for (const Ring& ring : rings) {
-    if (ring.empty()) continue;
-    Azimuths bins = by_azimuth(points, ring);
-    for (std::size_t k = 0; below && k < kAzimuthBins; ++k) {
-      const auto& low = (*below)[k];
-      const auto& high = bins[k];
-      if (!low || !high) continue;
-      const Eigen::Vector3f step = points[*high] - points[*low];
-      if (points[*low].z() > 0.0F || points[*high].z() > 0.0F) continue;
+  for (std::size_t ring = 1; ring < image.rings(); ++ring) {
+    for (std::size_t column = 0; column < image.columns(); ++column) {
+      const std::uint32_t low = image.at(image.ring_below(ring) * image.columns() + column);
+      const std::uint32_t high = image.at(ring * image.columns() + column);
+      if (low == RangeImage::kNoPoint || high == RangeImage::kNoPoint) continue;
+      const Eigen::Vector3f step = points[high] - points[low];
+      if (points[low].z() > 0.0F || points[high].z() > 0.0F) continue;
       if (static_cast<double>(std::abs(step.z())) <=
           most * static_cast<double>(step.head<2>().norm()))
-        ground[*low] = ground[*high] = 1;
+        ground[low] = ground[high] = 1;
     }
-    below = std::move(bins);
   }
   return ground;
 }
@@ -171,10 +152,15 @@ std::vector<PointFeature> RingFeatureFinder::find(const RingPoints& scan) const 
       features[rings[r][k]] = found[k];
   });
   if (!ground_) return features;
-  const std::vector<char> ground = ground_points(*scan.points, rings, config_.ground_slope_deg);
+  const RangeImage image(*scan.points, *scan.ring);
+  const std::vector<char> ground = ground_points(*scan.points, image, config_.ground_slope_deg);
+  const std::vector<char> clustered =
+      clustered_points(*scan.points, image, ground, config_.clusters);
   for (std::size_t i = 0; i < features.size(); ++i) {
-    if (ground[i] == 0) continue;
-    features[i] = features[i] == PointFeature::kPlane ? PointFeature::kGround : PointFeature::kNone;
+    if (ground[i] != 0 && features[i] == PointFeature::kPlane)
+      features[i] = PointFeature::kGround;
+    else if (clustered[i] == 0)
+      features[i] = PointFeature::kNone;
   }
   return features;
 }

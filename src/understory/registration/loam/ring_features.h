@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "understory/geometry/feature_points.h"
+#include "understory/registration/loam/ring_clusters.h"
 #include "understory/registration/matcher.h"
 #include "understory/util/config/config.h"
 
@@ -18,6 +19,7 @@ struct RingFeaturesConfig {
   int edges_per_sector = 20;       // at most
   double jump_m = 0.3;  // a neighbour so much nearer to the lidar hides what a surface does there
   double ground_slope_deg = 12.0;  // loam_ground: steeper ones are no ground
+  RingClustersConfig clusters;     // loam_ground: objects whose points count
 };
 void describe(ConfigTable& table, RingFeaturesConfig& config);
 
@@ -30,7 +32,8 @@ void describe(ConfigTable& table, RingFeaturesConfig& config);
 // points in each sector of a ring. None lies within theta points of another, and none on a surface
 // that something nearer hides. Planes are the smooth ones. With `ground` those of them that lie on
 // ground are kGround (Shan and Englot, LeGO-LOAM, 2018, section III.B). There the slope from a ring
-// to the next one at the same azimuth is small, below the lidar.
+// to the next one at the same azimuth is small, below the lidar. Of the others, points of small
+// clusters have no features then.
 class RingFeatureFinder : public FeatureFinder {
  public:
   RingFeatureFinder(const RingFeaturesConfig& config, bool ground)
