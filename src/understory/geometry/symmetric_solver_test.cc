@@ -11,7 +11,7 @@ namespace {
 
 // Positive definite, with eigenvalues of very different sizes.
 template <int N>
-Eigen::Matrix<double, N, N> example() {
+Eigen::Matrix<double, N, N> positive_definite() {
   Eigen::Matrix<double, N, N> root;
   for (int i = 0; i < N; ++i) {
     for (int k = 0; k < N; ++k)

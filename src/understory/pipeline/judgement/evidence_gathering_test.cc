@@ -48,7 +48,7 @@ ReadingFacts facts_of(const ReadRecording& recording, const EventOrderer::Report
 }
 
 // A lidar from 100 s to 160 s, and an IMU whose stamps lie between these.
-RunEvidence gathered(double imu_first_s, double imu_last_s, double imu_offset_s) {
+RunEvidence gathered_reading(double imu_first_s, double imu_last_s, double imu_offset_s) {
   const ReadRecording recording(
       {topic("lidar", 100.0, 160.0), topic("imu", imu_first_s, imu_last_s)});
   EventOrderer::Report repair;
@@ -61,18 +61,18 @@ RunEvidence gathered(double imu_first_s, double imu_last_s, double imu_offset_s)
 }
 
 TEST(EvidenceGathering, AnImuThatBeginsLateOrStops) {
-  const std::string why = gathered(104.0, 155.0, 0.0).imu.unused_why;
+  const std::string why = gathered_reading(104.0, 155.0, 0.0).imu.unused_why;
   EXPECT_NE(why.find("it begins 4.0 s after the lidar"), std::string::npos) << why;
   EXPECT_NE(why.find("it stops 5.0 s before the lidar"), std::string::npos) << why;
 }
 
 // A regression: the stamps were compared before their clock was mended.
 TEST(EvidenceGathering, AClockThatWasMendedIsNoLateImu) {
-  const std::string ahead = gathered(103.0, 163.0, -3.0).imu.unused_why;
+  const std::string ahead = gathered_reading(103.0, 163.0, -3.0).imu.unused_why;
   EXPECT_EQ(ahead, "its samples came after their scans were processed");
-  const std::string behind = gathered(97.0, 157.0, 3.0).imu.unused_why;
+  const std::string behind = gathered_reading(97.0, 157.0, 3.0).imu.unused_why;
   EXPECT_EQ(behind, "its samples came after their scans were processed");
-  const std::string late = gathered(100.0, 156.0, 4.0).imu.unused_why;
+  const std::string late = gathered_reading(100.0, 156.0, 4.0).imu.unused_why;
   EXPECT_EQ(late, "it begins 4.0 s after the lidar");
 }
 

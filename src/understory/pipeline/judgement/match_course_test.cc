@@ -17,7 +17,7 @@ struct Scan {
 };
 
 // 60 s at 10 Hz with cells of half a metre.
-MatchEvidence gathered(const std::function<Scan(double)>& at) {
+MatchEvidence gathered_matches(const std::function<Scan(double)>& at) {
   MatchCourse course(0.5);
   for (int i = 0; i < 600; ++i) {
     const Scan scan = at(0.1 * i);
@@ -30,7 +30,9 @@ MatchEvidence gathered(const std::function<Scan(double)>& at) {
 }
 
 TEST(MatchCourse, AGoodRunWithFewPointsAtItsBeginning) {
-  const MatchEvidence evidence = gathered([](double t) { return Scan{true, t < 9.0 ? 0.1 : 0.8}; });
+  const MatchEvidence evidence = gathered_matches([](double t) {
+    return Scan{true, t < 9.0 ? 0.1 : 0.8};
+  });
   EXPECT_EQ(evidence.few_share, 0.0);
   EXPECT_EQ(evidence.chance_share, 0.0);
   EXPECT_NEAR(evidence.blur_growth, 1.0, 1e-9);
@@ -38,7 +40,7 @@ TEST(MatchCourse, AGoodRunWithFewPointsAtItsBeginning) {
 
 TEST(MatchCourse, FewPointsOverALongStretch) {
   const auto stretch = [](double inliers, bool matched) {
-    return gathered([=](double t) {
+    return gathered_matches([=](double t) {
              return t > 30.0 && t < 40.0 ? Scan{matched, inliers} : Scan{};
            })
         .few_share;
@@ -47,7 +49,7 @@ TEST(MatchCourse, FewPointsOverALongStretch) {
   EXPECT_NEAR(stretch(0.8, false), 0.2, 1e-9);
   EXPECT_EQ(stretch(0.5, true), 0.0);
   // A run that finds few from its beginning to its end.
-  EXPECT_EQ(gathered([](double) { return Scan{true, 0.2}; }).few_share, 1.0);
+  EXPECT_EQ(gathered_matches([](double) { return Scan{true, 0.2}; }).few_share, 1.0);
 }
 
 // What is matched by chance lies anywhere in its cell.
@@ -59,14 +61,14 @@ TEST(MatchCourse, PointsThatLieWhereChancePutsThem) {
     squares += std::pow(random.uniform(-0.25, 0.25), 2);
   const double chance = std::sqrt(squares / kPoints);
   EXPECT_NEAR(chance, 0.25, 1e-3);
-  const MatchEvidence evidence = gathered([&](double t) {
+  const MatchEvidence evidence = gathered_matches([&](double t) {
     return Scan{true, 0.8, t > 50.0 ? chance : 0.2};
   });
   EXPECT_NEAR(evidence.chance_share, 0.2, 1e-9);
 }
 
 TEST(MatchCourse, AMapThatBlursAsItGrows) {
-  const MatchEvidence evidence = gathered([](double t) {
+  const MatchEvidence evidence = gathered_matches([](double t) {
     return Scan{true, 0.8, 0.16 + 0.001 * t};
   });
   EXPECT_NEAR(evidence.blur_growth, 0.212 / 0.178, 0.005);  // 44 s to 60 s over 10 s to 26 s

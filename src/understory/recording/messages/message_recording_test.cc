@@ -15,7 +15,17 @@
 namespace understory {
 namespace {
 
-using namespace test;
+using test::all_warnings;
+using test::bytes_of;
+using test::channel;
+using test::count_of;
+using test::kStart;
+using test::make_scan;
+using test::read_all;
+using test::Stored;
+using test::StoredSource;
+using test::TemporaryFolder;
+using test::write_bytes;
 
 // A message whose frame "lidar" is replaced by another name of five letters.
 std::vector<std::uint8_t> with_frame(std::vector<std::uint8_t> data, const std::string& frame) {

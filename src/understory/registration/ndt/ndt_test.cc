@@ -17,19 +17,9 @@ namespace {
 using testing::make_stand;
 using testing::Pattern;
 using testing::scan_stand;
+using testing::small_os0;
 using testing::Stand;
-
-Pose upright(double x, double y, double z, double yaw = 0.0) {
-  return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())),
-          Eigen::Vector3d(x, y, z)};
-}
-
-Pattern small_os0() {
-  Pattern pattern = testing::os0_128();
-  pattern.rings = 64;
-  pattern.columns = 512;
-  return pattern;
-}
+using testing::upright;
 
 NdtMapPtr map_of(const Points& points, const Pose& pose, double cell_m = 1.0) {
   NdtMapConfig config;
