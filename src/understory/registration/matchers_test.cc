@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
-#include <array>
-#include <cmath>
 #include <set>
 
 #include "understory/registration/test_stand.h"

@@ -1,9 +1,11 @@
 #include "understory/registration/test_stand.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"

@@ -98,7 +98,7 @@ Pose first_guess(const MappedWalk& walk, const std::vector<GnssFix>& fixes) {
 
 // Root mean square of how far keyframes lie off their true places, in the frame of the truth.
 double place_error_m(const MappedWalk& walk, const std::vector<GnssFix>& fixes,
-                   const FusedPath& path) {
+                     const FusedPath& path) {
   const GeodeticPlace origin{fixes.front().latitude_deg, fixes.front().longitude_deg,
                              fixes.front().height_m};
   const EastNorthUp from(origin);

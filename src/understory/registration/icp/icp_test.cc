@@ -2,9 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
-#include <set>
 
 #include "understory/registration/icp/icp_match.h"
 #include "understory/registration/test_stand.h"
