@@ -11,7 +11,8 @@ Two types or constants of one name in unnamed namespaces of a layer. The number 
 decides whether theirs are compiled together, and then they do not compile. APART files are exempt.
 
 Two of anything of one name in unnamed namespaces of a layer's tests, which are compiled together, too.
-Of functions, the compiler would take the one whose parameters fit. A `using` may stand in several.
+Of functions, the compiler would take the one whose parameters fit. A `using` may stand in several;
+no test has a `using namespace` or a macro.
 
     check_names.py [SOURCE_TREE]     exit 0: in order; 1: prints each pair; 2: no such tree
 """
@@ -95,6 +96,14 @@ def clashes(sources, names):
                 yield f"{path.name}: {name} is also a name of {file}: compiled together they clash"
 
 
+def leaks(sources):
+    """One line for each thing in a test that would hold for those compiled behind it, too."""
+    for path, text in sources.items():
+        for line in text.splitlines():
+            if line.startswith(("using namespace ", "#define ")):
+                yield f"{path.name}: `{line}` holds for the tests behind it, too"
+
+
 def hidden_numbers(layer, sources):
     """One line for each number of a table that a constant of another file of the layer may hide."""
     tables = {}
@@ -142,6 +151,7 @@ def check(tree):
         yield from hidden_numbers(layer, sources)
         yield from clashes(sources, names_of_source)
         yield from clashes(tests(layer), names_of_test)
+        yield from leaks(tests(layer))
 
 
 def main():

@@ -107,6 +107,9 @@ class CheckNames(unittest.TestCase):
             self.assertEqual(len(of(text, walk)), 1, text)
             self.assertEqual(len(of(walk, text)), 1, text)
         self.assertEqual(len(of("using walk = int;", "using walk = float;")), 1)
+        for text in ("using namespace test;", "#define WALK 1"):
+            self.assertEqual(findings({"a/one_test.cc": own(text)}),
+                             [f"one_test.cc: `{text}` holds for the tests behind it, too"])
 
 
 if __name__ == "__main__":
