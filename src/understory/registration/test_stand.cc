@@ -168,7 +168,7 @@ Pattern small_os0() {
 Points thin(const Points& points, float cube_m) {
   std::set<std::array<int, 3>> seen;
   Points kept;
-  for (const Eigen::Vector3f& p : points, float cube_m) {
+  for (const Eigen::Vector3f& p : points) {
     const auto cube = [&](float v) { return static_cast<int>(std::floor(v / cube_m)); };
     if (seen.insert({cube(p.x()), cube(p.y()), cube(p.z())}).second) kept.push_back(p);
   }
