@@ -19,7 +19,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 std::filesystem::path folder() {
-  return std::filesystem::path(testing::TempDir()) / "map_entropy_tiles";
+  return std::filesystem::path(::testing::TempDir()) / "map_entropy_tiles";
 }
 
 // A wall of 4 x 2 m over two tiles, its points off it by `sd_m`.

@@ -25,7 +25,7 @@ Pose pose_along_x(double x) {
   return Pose(Eigen::Quaterniond::Identity(), {x, 0.0, 0.0});
 }
 
-class ScanCloudsTest : public testing::Test {
+class ScanCloudsTest : public ::testing::Test {
  protected:
   ScanCloudsTest() {
     config_.range_min_m = 1.5;

@@ -21,7 +21,7 @@ void put_mine(const fs::path& path) {
   std::ofstream(path) << "mine";
 }
 
-class OutputGuard : public testing::Test {
+class OutputGuard : public ::testing::Test {
  protected:
   OutputGuard() {
     put_mine(home_ / "data" / "walk.mcap");
