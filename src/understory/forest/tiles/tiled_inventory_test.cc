@@ -165,7 +165,7 @@ TEST(TiledInventory, TheSameTreesWhateverTheTilesAre) {
   const std::vector<std::uint32_t> labels = labels_of(whole, nullptr);
   bool backwards = false;
   for (const double tile_m : {128.0, 50.0, 25.0, 20.3}) {
-    SCOPED_TRACE(testing::Message() << tile_m);
+    SCOPED_TRACE(::testing::Message() << tile_m);
     const SortedCloud tiles(strip_of_stems(), tile_m, backwards, backwards);
     const InventoryResult tiled = take_inventory(tiles, {});
     expect_same(whole, tiled);
