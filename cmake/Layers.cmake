@@ -50,8 +50,9 @@ endfunction()
 # understory_unite(<target> <together> <source>...): makes the files parts of the target. With
 # UNDERSTORY_UNITY so many of them are compiled as one. The headers which they share are parsed
 # once, and their templates compiled once: a build from nothing takes half the time. Names in
-# unnamed namespaces must differ within a layer then. CMake's own unity builds write absolute paths,
-# which ccache cannot know again in another clone.
+# unnamed namespaces must differ then: within a layer's sources, and within its tests
+# (tools/check_names.py). Files outside src are compiled by themselves. CMake's own unity builds write
+# absolute paths, which ccache cannot know again in another clone.
 function(understory_unite target together)
   set(batch "")
   set(number 0)
@@ -60,11 +61,11 @@ function(understory_unite target together)
     target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
   endif()
   foreach(source IN LISTS ARGN)
-    if(NOT UNDERSTORY_UNITY OR IS_ABSOLUTE "${source}")
+    file(RELATIVE_PATH path "${PROJECT_SOURCE_DIR}/src" "${CMAKE_CURRENT_SOURCE_DIR}/${source}")
+    if(NOT UNDERSTORY_UNITY OR IS_ABSOLUTE "${source}" OR path MATCHES "^\\.\\./")
       target_sources(${target} PRIVATE "${source}")
       continue()
     endif()
-    file(RELATIVE_PATH path "${PROJECT_SOURCE_DIR}/src" "${CMAKE_CURRENT_SOURCE_DIR}/${source}")
     list(APPEND batch "#include \"${path}\"")
     set_source_files_properties("${source}" PROPERTIES HEADER_FILE_ONLY ON)
     target_sources(${target} PRIVATE "${source}")
@@ -104,7 +105,8 @@ function(understory_test target)
     math(EXPR arg_TIMEOUT "5 * ${arg_TIMEOUT}")
   endif()
   list(TRANSFORM arg_LAYERS PREPEND understory::)
-  add_executable(${target} ${arg_SOURCES})
+  add_executable(${target})
+  understory_unite(${target} 8 ${arg_SOURCES})
   target_link_libraries(${target} PRIVATE understory_own_code ${arg_LAYERS} ${arg_LIBRARIES}
                                           GTest::gtest_main)
   understory_precompile(${target})

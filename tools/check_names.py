@@ -10,6 +10,10 @@ compiled together, the constant hides the number, if it comes first. Files that 
 Two types or constants of one name in unnamed namespaces of a layer. The number of the layer's files
 decides whether theirs are compiled together, and then they do not compile. APART files are exempt.
 
+Two of anything of one name in unnamed namespaces of a layer's tests, which are compiled together, too.
+Of functions, the compiler would take the one whose parameters fit. A `using` may stand in several;
+no test has a `using namespace` or a macro.
+
     check_names.py [SOURCE_TREE]     exit 0: in order; 1: prints each pair; 2: no such tree
 """
 
@@ -26,10 +30,15 @@ NUMBER = re.compile(r"inline constexpr [^=;]*?\b(k\w+)(?:\[\])? =")
 USED = re.compile(r"^using namespace (\w+_constants)::(\w+);", re.MULTILINE)
 APART = re.compile(r"^ +APART\s+((?:[\w/.]+\.cc\s+)+)", re.MULTILINE)
 CONSTANT = re.compile(r"^(?:static )?constexpr [^=;{(]*?\b(k\w+)\s*(?:\[[^\]]*\])?\s*[={]", re.MULTILINE)
+FUNCTION = re.compile(r"^(?!TEST|TYPED_TEST|INSTANTIATE|using |template|return |struct |class )"
+                      r"[\w:][\w:<>,&* ]*?[ &*>](\w+)\(")
+OBJECT = re.compile(r"^(?:static |inline )*const(?:expr)? [^=;{(]*?[ &*>](\w+)(?:\[[^\]]*\])?\s*[={;(]")
+BORROWED = re.compile(r"^using (?:[\w:]+::)?(\w+);")
+ALIAS = re.compile(r"^(?:using|namespace) (\w+) = ")
 
 
 def united(layer):
-    """The text of each file of the layer that may be compiled together with others."""
+    """The text of each source of the layer that may be compiled together with others."""
     lists = layer / "CMakeLists.txt"
     apart = APART.search(lists.read_text(encoding="utf-8")) if lists.is_file() else None
     alone = {layer / name for name in apart.group(1).split()} if apart else set()
@@ -37,8 +46,13 @@ def united(layer):
             if not path.name.endswith("_test.cc") and path not in alone}
 
 
+def tests(layer):
+    """The text of each test of the layer."""
+    return {path: path.read_text(encoding="utf-8") for path in sorted(layer.rglob("*_test.cc"))}
+
+
 def unnamed(text):
-    """Types and constants of unnamed namespaces."""
+    """The lines of unnamed namespaces, but for their own first and last ones."""
     spaces = []
     for line in text.splitlines():
         opened = OPENED.match(line)
@@ -47,19 +61,47 @@ def unnamed(text):
         elif CLOSED.match(line) and spaces:
             spaces.pop()
         elif None in spaces:
-            found = CONSTANT.match(line) or (not line.rstrip().endswith(";") and TYPE.match(line))
-            if found:
-                yield found.group(1)
+            yield line
 
 
-def clashes(sources):
+def type_of(line):
+    """The type that a line begins to define."""
+    return None if line.rstrip().endswith(";") else TYPE.match(line)
+
+
+def names_of_source(text):
+    """(name, what it is) of types and constants of unnamed namespaces."""
+    for line in unnamed(text):
+        found = CONSTANT.match(line) or type_of(line)
+        if found:
+            yield found.group(1), None
+
+
+def names_of_test(text):
+    """(name, what it is) of all that stands in unnamed namespaces. None is another thing in each file."""
+    for line in unnamed(text):
+        borrowed = BORROWED.match(line) or ALIAS.match(line)
+        found = borrowed or type_of(line) or OBJECT.match(line) or FUNCTION.match(line)
+        if found:
+            yield found.group(1), line if borrowed else None
+
+
+def clashes(sources, names):
     """One line for each name that two files give to something of their own."""
     first = {}
     for path, text in sources.items():
-        for name in dict.fromkeys(unnamed(text)):
-            if name in first:
-                yield f"{path.name}: {name} is also a name of {first[name]}: compiled together they clash"
-            first.setdefault(name, path.name)
+        for name, what in dict.fromkeys(names(text)):
+            file, other = first.setdefault(name, (path.name, what))
+            if file != path.name and (what is None or what != other):
+                yield f"{path.name}: {name} is also a name of {file}: compiled together they clash"
+
+
+def leaks(sources):
+    """One line for each thing in a test that would hold for those compiled behind it, too."""
+    for path, text in sources.items():
+        for line in text.splitlines():
+            if line.startswith(("using namespace ", "#define ")):
+                yield f"{path.name}: `{line}` holds for the tests behind it, too"
 
 
 def hidden_numbers(layer, sources):
@@ -107,7 +149,9 @@ def check(tree):
     for layer in sorted(path for path in root.iterdir() if path.is_dir()):
         sources = united(layer)
         yield from hidden_numbers(layer, sources)
-        yield from clashes(sources)
+        yield from clashes(sources, names_of_source)
+        yield from clashes(tests(layer), names_of_test)
+        yield from leaks(tests(layer))
 
 
 def main():

@@ -86,6 +86,31 @@ class CheckNames(unittest.TestCase):
         local = "int f() {\n  constexpr double kNear = 1.0;\n}"
         self.assertEqual(findings({"a/one.cc": own(local), "a/two.cc": own(local)}), [])
 
+    def test_one_name_in_unnamed_namespaces_of_tests_is_an_error(self):
+        def own(text):
+            return f"namespace u {{\nnamespace {{\n{text}\n}}  // namespace\n}}  // namespace u\n"
+
+        def of(one, two):
+            return findings({"a/one_test.cc": own(one), "a/x/two_test.cc": own(two)})
+        walk = "std::vector<Pose> walk(int n) {\n  return {};\n}"
+        for text in ("constexpr double kNear = 1.0;", "const Vector3d kArm(1.0, 2.0);", "struct Walk {\n};",
+                     "template <int N>\nconst Tree& walk(\n    int n) {\n}", walk):
+            self.assertEqual(len(of(text, text)), 1, text)
+            self.assertEqual(findings({"a/one_test.cc": own(text), "b/two_test.cc": own(text)}), [])
+            self.assertEqual(findings({"a/one_test.cc": own(text), "a/two.cc": own(text)}), [])
+        self.assertEqual(of(walk, "int walk() {\n}"), [
+            "two_test.cc: walk is also a name of one_test.cc: compiled together they clash"])
+        self.assertEqual(of("TEST(Walk, Ends) {\n  walk(1);\n}", walk), [])
+        self.assertEqual(of("int far() {\n  const int near = 1;\n}", "int near() {\n}"), [])
+        for text in ("using test::walk;", "using walk = test::Walk;", "namespace walk = std::filesystem;"):
+            self.assertEqual(of(text, text), [], text)
+            self.assertEqual(len(of(text, walk)), 1, text)
+            self.assertEqual(len(of(walk, text)), 1, text)
+        self.assertEqual(len(of("using walk = int;", "using walk = float;")), 1)
+        for text in ("using namespace test;", "#define WALK 1"):
+            self.assertEqual(findings({"a/one_test.cc": own(text)}),
+                             [f"one_test.cc: `{text}` holds for the tests behind it, too"])
+
 
 if __name__ == "__main__":
     unittest.main()

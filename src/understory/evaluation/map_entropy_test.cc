@@ -19,7 +19,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 std::filesystem::path folder() {
-  return std::filesystem::path(testing::TempDir()) / "map_entropy_tiles";
+  return std::filesystem::path(::testing::TempDir()) / "map_entropy_tiles";
 }
 
 // A wall of 4 x 2 m over two tiles, its points off it by `sd_m`.
@@ -32,7 +32,7 @@ std::vector<Vector3d> wall(double sd_m, int count, std::uint64_t seed) {
   return points;
 }
 
-MapEntropy measured(const std::vector<Vector3d>& points) {
+MapEntropy entropy_of(const std::vector<Vector3d>& points) {
   MapEntropyMeter meter(folder(), {});
   for (const Vector3d& point : points)
     meter.add(point);
@@ -67,7 +67,7 @@ TEST(MapEntropy, IsTheDefinitionOverTheBordersOfTiles) {
   std::vector<Vector3d> points = wall(0.02, 800, 3);
   points.emplace_back(-30.0, 5.0, 1.0);  // alone
   const MapEntropy expected = by_definition(points, {});
-  const MapEntropy found = measured(points);
+  const MapEntropy found = entropy_of(points);
   EXPECT_EQ(found.points, 801U);
   EXPECT_EQ(found.points_used, expected.points_used);
   EXPECT_LT(found.points_used, 801U);
@@ -76,8 +76,8 @@ TEST(MapEntropy, IsTheDefinitionOverTheBordersOfTiles) {
 
 // A wall that is twice as thick has ln 2 more.
 TEST(MapEntropy, GrowsWithTheLogarithmOfTheThickness) {
-  const MapEntropy thin = measured(wall(0.01, 20'000, 4));
-  const MapEntropy thick = measured(wall(0.02, 20'000, 4));
+  const MapEntropy thin = entropy_of(wall(0.01, 20'000, 4));
+  const MapEntropy thick = entropy_of(wall(0.02, 20'000, 4));
   EXPECT_NEAR(thick.mean_entropy_nats - thin.mean_entropy_nats, std::log(2.0), 0.02);
   EXPECT_NEAR(std::sqrt(thin.mean_plane_variance_m2), 0.01, 5e-4);
 }
@@ -109,11 +109,11 @@ TEST(MapEntropy, IsTheSameForAnyNumberOfThreadsAndOfNothingIsUnknown) {
   const std::vector<Vector3d> points = wall(0.01, 5'000, 5);
   double one = 0.0;
   double four = 0.0;
-  with_threads(1, [&] { one = measured(points).mean_entropy_nats; });
-  with_threads(4, [&] { four = measured(points).mean_entropy_nats; });
+  with_threads(1, [&] { one = entropy_of(points).mean_entropy_nats; });
+  with_threads(4, [&] { four = entropy_of(points).mean_entropy_nats; });
   EXPECT_EQ(one, four);
   EXPECT_FALSE(std::filesystem::exists(folder()));
-  EXPECT_TRUE(std::isnan(measured({}).mean_entropy_nats));
+  EXPECT_TRUE(std::isnan(entropy_of({}).mean_entropy_nats));
 }
 
 }  // namespace

@@ -40,8 +40,8 @@ double least_by_trial(const SparseCosts& costs, double unassigned, std::size_t r
 }
 
 // Cost of an assignment; checks that it is one.
-double cost_of(const SparseCosts& costs, const std::vector<std::size_t>& column_of,
-               double unassigned) {
+double assignment_cost(const SparseCosts& costs, const std::vector<std::size_t>& column_of,
+                       double unassigned) {
   double sum = 0.0;
   std::set<std::size_t> taken;
   for (std::size_t row = 0; row < column_of.size(); ++row) {
@@ -71,7 +71,7 @@ TEST(SparseAssignment, CostsAsLittleAsTheBestOfAllAssignments) {
     const double best = least_by_trial(costs, unassigned, 0, taken);
     const auto found = least_cost_assignment(costs, unassigned);
     ASSERT_EQ(found.size(), rows);
-    EXPECT_NEAR(cost_of(costs, found, unassigned), best, 1e-12) << "round " << round;
+    EXPECT_NEAR(assignment_cost(costs, found, unassigned), best, 1e-12) << "round " << round;
   }
 }
 

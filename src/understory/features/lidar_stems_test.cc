@@ -40,13 +40,13 @@ Scan scan_with_stems(const std::vector<Eigen::Vector2d>& places) {
 }
 
 // Two lidars three metres apart that look opposite ways, and what they see of the same two stems.
-struct Machine {
+struct ScannedMachine {
   Rig rig;
   Scan merged;
 };
 
-Machine machine(double tilt_rad = 0.0) {
-  Machine made;
+ScannedMachine machine(double tilt_rad = 0.0) {
+  ScannedMachine made;
   const Eigen::Quaterniond back(Eigen::AngleAxisd(EIGEN_PI, Eigen::Vector3d::UnitZ()) *
                                 Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitY()));
   const Pose first_from_second(back, Eigen::Vector3d(-3.0, 0.0, 0.4));
@@ -69,7 +69,7 @@ Machine machine(double tilt_rad = 0.0) {
 }
 
 TEST(LidarStems, AreFoundLidarByLidarAndCountOnce) {
-  const Machine made = machine();
+  const ScannedMachine made = machine();
   const std::vector<LidarStems> lidars =
       find_stems_of_lidars(made.merged, made.rig, StemSegmentConfig());
   ASSERT_EQ(lidars.size(), 2U);
@@ -91,7 +91,7 @@ TEST(LidarStems, AreFoundLidarByLidarAndCountOnce) {
 }
 
 TEST(LidarStems, RingsOfTheSecondLidarAreLevelInItsOwnFrame) {
-  Machine made = machine(0.7);
+  ScannedMachine made = machine(0.7);
   EXPECT_TRUE(all_have_level_rings(made.merged, made.rig));
   std::erase_if(made.merged.points,
                 [](const ScanPoint& point) { return point.ring < kRingsALidar; });

@@ -7,18 +7,17 @@
 #include <cmath>
 #include <vector>
 
+#include "understory/forest/test_plot.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
 
-using Points = std::vector<Eigen::Vector3d>;
-
 // A plot of 30 m on a slope: rolling ground, stems of 20 m with crowns that start half way up.
-Points stand(double slope = 0.15) {
+Cloud stand_on_slope(double slope = 0.15) {
   Random random(5);
   const auto ground = [&](double x, double y) { return slope * x + 0.5 * std::sin(0.3 * y); };
-  Points points;
+  Cloud points;
   for (int i = 0; i < 40'000; ++i) {
     const double x = random.uniform(0.0, 30.0);
     const double y = random.uniform(0.0, 30.0);
@@ -37,20 +36,20 @@ Points stand(double slope = 0.15) {
   return points;
 }
 
-Points changed(const Points& points, const Eigen::Matrix3d& change) {
-  Points result;
+Cloud changed(const Cloud& points, const Eigen::Matrix3d& change) {
+  Cloud result;
   for (const Eigen::Vector3d& point : points)
     result.emplace_back(change * point + Eigen::Vector3d(4.1e5, 6.7e6, 120.0));
   return result;
 }
 
-CloudShape shape_of(const Points& points) {
+CloudShape shape_of(const Cloud& points) {
   return understory::shape_of([&](const PointVisitor& visit) { visit(points); });
 }
 
 TEST(CloudShape, AStandInMetresIsLeftAlone) {
   for (const double slope : {0.0, 0.15, 0.8}) {
-    const CloudShape shape = shape_of(changed(stand(slope), Eigen::Matrix3d::Identity()));
+    const CloudShape shape = shape_of(changed(stand_on_slope(slope), Eigen::Matrix3d::Identity()));
     EXPECT_EQ(up_complaint(shape), "") << slope;
     EXPECT_EQ(unit_complaint(shape), "") << slope;
     EXPECT_LT(shape.roughness[0], 0.1) << slope;
@@ -62,7 +61,7 @@ TEST(CloudShape, AStandInMetresIsLeftAlone) {
 TEST(CloudShape, TheAxisThatIsUpIsNamed) {
   for (const UpAxis axis : kUpAxes) {
     // upright_from_cloud undoes what this does.
-    const Points turned = changed(stand(), upright_from_cloud(axis).transpose());
+    const Cloud turned = changed(stand_on_slope(), upright_from_cloud(axis).transpose());
     const auto found = other_up_axis(shape_of(turned));
     if (axis == UpAxis::kZ) {
       EXPECT_FALSE(found.has_value());
@@ -76,13 +75,13 @@ TEST(CloudShape, TheAxisThatIsUpIsNamed) {
 }
 
 TEST(CloudShape, GroundThatIsSteeperThanForestsStandOnIsNotLevel) {
-  const CloudShape shape = shape_of(changed(stand(1.5), Eigen::Matrix3d::Identity()));
+  const CloudShape shape = shape_of(changed(stand_on_slope(1.5), Eigen::Matrix3d::Identity()));
   EXPECT_NE(up_complaint(shape).find("inclined by 5"), std::string::npos)
       << shape.ground_slope_deg << ' ' << shape.roughness[0];
 }
 
 TEST(CloudShape, OtherUnitsAreTold) {
-  const Points points = stand();
+  const Cloud points = stand_on_slope();
   const auto complaint = [&](double scale) {
     return unit_complaint(shape_of(changed(points, scale * Eigen::Matrix3d::Identity())));
   };
@@ -95,7 +94,7 @@ TEST(CloudShape, OtherUnitsAreTold) {
 
 TEST(CloudShape, FeetAreSuspectedWhereAStandIsTall) {
   const auto suspicion = [&](double scale) {
-    return feet_suspicion(shape_of(changed(stand(), scale * Eigen::Matrix3d::Identity())));
+    return feet_suspicion(shape_of(changed(stand_on_slope(), scale * Eigen::Matrix3d::Identity())));
   };
   EXPECT_EQ(suspicion(1.0), "");
   EXPECT_NE(suspicion(1.0 / 0.3048).find("usual for feet"), std::string::npos);
@@ -109,7 +108,7 @@ TEST(CloudShape, TheDirectionOfStemsTellsATiltedScanner) {
       for (const double around : {0.2, 2.3}) {
         const Eigen::Vector3d hinge(std::cos(around), std::sin(around), 0.0);
         const Eigen::Matrix3d turn = Eigen::AngleAxisd(tilt * M_PI / 180.0, hinge).matrix();
-        const CloudShape shape = shape_of(changed(stand(slope), turn));
+        const CloudShape shape = shape_of(changed(stand_on_slope(slope), turn));
         if (other_up_axis(shape)) continue;  // told already
         const auto axis = leaning_axis(shape);
         ASSERT_TRUE(axis.has_value()) << slope << ' ' << tilt << ' ' << around;
@@ -121,15 +120,15 @@ TEST(CloudShape, TheDirectionOfStemsTellsATiltedScanner) {
 }
 
 TEST(CloudShape, ASliceHasNoGroundAndIsNoDefect) {
-  Points slice;
-  for (const Eigen::Vector3d& point : stand(0.0))
+  Cloud slice;
+  for (const Eigen::Vector3d& point : stand_on_slope(0.0))
     if (point.z() > 1.2 && point.z() < 1.4) slice.push_back(point);
   ASSERT_GT(slice.size(), 100U);
   const CloudShape shape = shape_of(slice);
   EXPECT_EQ(up_complaint(shape), "");
   EXPECT_EQ(unit_complaint(shape), "");
-  EXPECT_EQ(unit_complaint(shape_of(Points(3, Eigen::Vector3d(1, 2, 3)))), "");
-  EXPECT_EQ(up_complaint(shape_of(Points())), "");
+  EXPECT_EQ(unit_complaint(shape_of(Cloud(3, Eigen::Vector3d(1, 2, 3)))), "");
+  EXPECT_EQ(up_complaint(shape_of(Cloud())), "");
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ namespace {
 
 // Positive definite, with eigenvalues of very different sizes.
 template <int N>
-Eigen::Matrix<double, N, N> example() {
+Eigen::Matrix<double, N, N> positive_definite() {
   Eigen::Matrix<double, N, N> root;
   for (int i = 0; i < N; ++i) {
     for (int k = 0; k < N; ++k)
@@ -22,7 +22,7 @@ Eigen::Matrix<double, N, N> example() {
 
 template <int N>
 void solves() {
-  const auto matrix = example<N>();
+  const auto matrix = positive_definite<N>();
   const SymmetricSolver<N> solver(matrix);
   EXPECT_TRUE(solver.is_positive());
   const Eigen::Matrix<double, N, 1> right = Eigen::Matrix<double, N, 1>::LinSpaced(1.0, 2.0);
@@ -45,7 +45,7 @@ TEST(SymmetricSolver, KnowsADirectionThatIsOpen) {
 }
 
 TEST(SymmetricEigen, BothWaysGiveTheAxesOfAScatter) {
-  const Eigen::Matrix3d matrix = example<3>();
+  const Eigen::Matrix3d matrix = positive_definite<3>();
   const Eigen::Vector3d exact = symmetric_eigenvalues(matrix);
   const SymmetricEigen3 fast = fast_symmetric_eigen(matrix);
   EXPECT_LE(exact(0), exact(1));

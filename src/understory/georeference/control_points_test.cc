@@ -32,7 +32,7 @@ std::vector<ControlPoint> surveyed(int count, double noise_m, std::uint64_t seed
   return points;
 }
 
-double error_m(const ControlFit& fit) {
+double error_of_fit_m(const ControlFit& fit) {
   return (fit.target_from_world * Vector3d(10.0, 20.0, 2.0) -
           survey_from_run() * Vector3d(10.0, 20.0, 2.0))
       .norm();
@@ -41,12 +41,12 @@ double error_m(const ControlFit& fit) {
 TEST(ControlPoints, LayARunOnASurvey) {
   const ControlFit fit = fit_control_points(surveyed(6, 0.03, 1), {});
   ASSERT_TRUE(fit.found) << fit.reason;
-  EXPECT_LT(error_m(fit), 0.06);
+  EXPECT_LT(error_of_fit_m(fit), 0.06);
   EXPECT_EQ(fit.redundant, 14);
   for (const char used : fit.used)
     EXPECT_TRUE(used);
   // Two points are enough for a level run, and nothing is checked then but their distance.
-  EXPECT_LT(error_m(fit_control_points(surveyed(2, 0.0, 3), {})), 1e-3);
+  EXPECT_LT(error_of_fit_m(fit_control_points(surveyed(2, 0.0, 3), {})), 1e-3);
 }
 
 TEST(ControlPoints, OneBlunderAmongFourIsFound) {
@@ -87,7 +87,7 @@ TEST(ControlPoints, HeightsMayBeMissingButNotAll) {
   std::vector<ControlPoint> points = surveyed(5, 0.02, 6);
   for (std::size_t k = 1; k < points.size(); ++k)
     points[k].place_in_target.z() = std::nan("");
-  EXPECT_LT(error_m(fit_control_points(points, {})), 0.3);
+  EXPECT_LT(error_of_fit_m(fit_control_points(points, {})), 0.3);
   points[0].place_in_target.z() = std::nan("");
   EXPECT_FALSE(fit_control_points(points, {}).found);
   EXPECT_FALSE(fit_control_points({points[0]}, {}).found);

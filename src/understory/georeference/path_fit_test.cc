@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector3d;
 
 // Along a strip road of 170 m that bends, with stops where the scanner swings.
-std::vector<Vector3d> drive() {
+std::vector<Vector3d> strip_road() {
   std::vector<Vector3d> path;
   for (int k = 0; k < 680; ++k) {
     const double s = 0.25 * k;
@@ -27,8 +27,8 @@ std::vector<Vector3d> drive() {
 }
 
 // A receiver that errs slowly and, if asked, runs away by 6 m twice.
-std::vector<Vector3d> receiver(const std::vector<Vector3d>& path, const Pose& target_from_source,
-                               bool runaways) {
+std::vector<Vector3d> fixes_with_drift(const std::vector<Vector3d>& path,
+                                       const Pose& target_from_source, bool runaways) {
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0.0, 1.0);
   Vector3d slow = Vector3d::Zero();
@@ -77,11 +77,11 @@ double printed_value(const std::vector<Vector3d>& path, const std::vector<Vector
 }
 
 TEST(PathFit, FindsTheMotionWithoutAStart) {
-  const std::vector<Vector3d> path = drive();
+  const std::vector<Vector3d> path = strip_road();
   for (const bool robust : {false, true}) {
     PathFitConfig config;
     config.robust = robust;
-    const PathFit fit = fit_path(path, receiver(path, motion(), false), config);
+    const PathFit fit = fit_path(path, fixes_with_drift(path, motion(), false), config);
     ASSERT_TRUE(fit.found) << fit.reason;
     EXPECT_LT(yaw_error_deg(fit), 0.5);
     EXPECT_LT(middle_error_m(fit), 0.5);
@@ -92,8 +92,8 @@ TEST(PathFit, FindsTheMotionWithoutAStart) {
 }
 
 TEST(PathFit, IsTheMinimumOfThePrintedSum) {
-  const std::vector<Vector3d> path = drive();
-  const std::vector<Vector3d> fixes = receiver(path, motion(), false);
+  const std::vector<Vector3d> path = strip_road();
+  const std::vector<Vector3d> fixes = fixes_with_drift(path, motion(), false);
   PathFitConfig config;
   config.robust = false;
   const PathFit fit = fit_path(path, fixes, config);
@@ -119,8 +119,8 @@ TEST(PathFit, IsTheMinimumOfThePrintedSum) {
 }
 
 TEST(PathFit, RunawaysHaveNoSay) {
-  const std::vector<Vector3d> path = drive();
-  const std::vector<Vector3d> fixes = receiver(path, motion(), true);
+  const std::vector<Vector3d> path = strip_road();
+  const std::vector<Vector3d> fixes = fixes_with_drift(path, motion(), true);
   PathFitConfig config;
   config.robust = false;
   const PathFit plain = fit_path(path, fixes, config);
@@ -188,18 +188,18 @@ TEST(PathFit, AStraightWayFitsTheOtherWayRoundAsWell) {
   std::vector<Vector3d> path;
   for (int k = 0; k <= 400; ++k)
     path.emplace_back(0.25 * k, 0.0, 0.0);
-  const PathFit fit = fit_path(path, receiver(path, motion(), false), {});
+  const PathFit fit = fit_path(path, fixes_with_drift(path, motion(), false), {});
   ASSERT_TRUE(fit.found);
   EXPECT_LT(fit.turned_rms_m, 1.3 * fit.symmetric_rms_m);
 }
 
 TEST(PathFit, TooLittleSaysSo) {
-  const PathFit none = fit_path({}, drive(), {});
+  const PathFit none = fit_path({}, strip_road(), {});
   EXPECT_FALSE(none.found);
   EXPECT_NE(none.reason.find("0 points"), std::string::npos);
   const std::vector<Vector3d> still(100, Vector3d(1.0, 2.0, 3.0));
-  EXPECT_FALSE(fit_path(still, drive(), {}).found);
-  EXPECT_FALSE(fit_path(drive(), still, {}).found);
+  EXPECT_FALSE(fit_path(still, strip_road(), {}).found);
+  EXPECT_FALSE(fit_path(strip_road(), still, {}).found);
 }
 
 // Fixes of a path with errors that go together over a minute, and the path in a frame of its own.

@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "understory/graph/test_covariance.h"
 #include "understory/util/angles.h"
 #include "understory/util/random.h"
 
@@ -12,24 +13,18 @@ namespace understory {
 namespace {
 
 using Eigen::Vector3d;
+using test::covariance;
 
 const Vector3d kAntenna(0.1, -0.2, 1.4);
 
-Matrix6d covariance(double rotation, double translation) {
-  Matrix6d c = Matrix6d::Zero();
-  c.diagonal() << Vector3d::Constant(rotation * rotation),
-      Vector3d::Constant(translation * translation);
-  return c;
-}
-
 // A walk of `n` keyframes, a metre and a second apart, in bends, as the odometry has it. The world
 // frame begins at the first keyframe and turns away from the truth with the way.
-struct Walk {
+struct WalkWithGnss {
   std::vector<Pose> truth;  // east, north, up
   PoseGraphProblem problem;
   Pose enu_from_world;  // by the first keyframe
 
-  Walk(int n, double turn_per_m, double noise_per_m, std::uint64_t seed) {
+  WalkWithGnss(int n, double turn_per_m, double noise_per_m, std::uint64_t seed) {
     Random random(seed);
     Pose at(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vector3d::UnitZ())), Vector3d(30, -20, 4));
     enu_from_world = at;
@@ -56,7 +51,7 @@ struct Walk {
 };
 
 // Positions with errors of both kinds; `jump` in metres from `from` to `to`.
-std::vector<GnssObservation> positions_of(const Walk& walk, const GnssErrors& errors,
+std::vector<GnssObservation> positions_of(const WalkWithGnss& walk, const GnssErrors& errors,
                                           std::uint64_t seed, double jump = 0.0, int from = 0,
                                           int to = 0) {
   Random random(seed);
@@ -105,7 +100,7 @@ constexpr GnssErrors kGood{0.02, 0.03, 0.03, 0.05, 100.0};
 constexpr GnssErrors kForest{2.0, 0.5, 4.0, 1.0, 100.0};
 
 TEST(GnssFusion, GoodPositionsTakeTheDriftOut) {
-  const Walk walk(300, 0.03 * kDegree, 0.005, 1);
+  const WalkWithGnss walk(300, 0.03 * kDegree, 0.005, 1);
   const double before = rms(walk.problem.world_from_keyframe, walk.truth);
   const GnssFusionResult result =
       fuse_gnss(walk.problem, {}, positions_of(walk, kGood, 2), walk.enu_from_world, kGood, {});
@@ -115,7 +110,7 @@ TEST(GnssFusion, GoodPositionsTakeTheDriftOut) {
 }
 
 TEST(GnssFusion, TheLeverArmIsTakenOff) {
-  const Walk walk(100, 0.0, 0.0, 1);
+  const WalkWithGnss walk(100, 0.0, 0.0, 1);
   std::vector<GnssObservation> observations = positions_of(walk, kGood, 2);
   GnssFusionResult result =
       fuse_gnss(walk.problem, {}, observations, walk.enu_from_world, kGood, {});
@@ -128,7 +123,7 @@ TEST(GnssFusion, TheLeverArmIsTakenOff) {
 
 // The odometry turns away by 9 degrees, which positions under trees do not tell well.
 TEST(GnssFusion, HeadingsOfASecondAntennaTakeATurnOut) {
-  const Walk walk(300, 0.03 * kDegree, 0.0, 1);
+  const WalkWithGnss walk(300, 0.03 * kDegree, 0.0, 1);
   std::vector<GnssObservation> observations = positions_of(walk, kForest, 2);
   const auto worst_deg = [&](const GnssFusionResult& result) {  // about up
     double worst = 0.0;
@@ -158,7 +153,7 @@ TEST(GnssFusion, HeadingsOfASecondAntennaTakeATurnOut) {
 
 TEST(GnssFusion, ErrorsUnderTreesDoNotBendThePath) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const Walk walk(300, 0.0, 0.003, seed);
+    const WalkWithGnss walk(300, 0.0, 0.003, seed);
     const GnssFusionResult result =
         fuse_gnss(walk.problem, {}, positions_of(walk, kForest, 100 + seed), walk.enu_from_world,
                   kForest, {});
@@ -170,7 +165,7 @@ TEST(GnssFusion, ErrorsUnderTreesDoNotBendThePath) {
 }
 
 TEST(GnssFusion, AJumpOfMinutesNeitherBendsNorMovesThePath) {
-  const Walk walk(300, 0.0, 0.003, 3);
+  const WalkWithGnss walk(300, 0.0, 0.003, 3);
   const auto clean =
       fuse_gnss(walk.problem, {}, positions_of(walk, kForest, 5), walk.enu_from_world, kForest, {});
   const auto jumping = fuse_gnss(walk.problem, {}, positions_of(walk, kForest, 5, 10.0, 100, 160),
@@ -182,7 +177,7 @@ TEST(GnssFusion, AJumpOfMinutesNeitherBendsNorMovesThePath) {
 }
 
 TEST(GnssFusion, OutagesAndMissingHeightsAreNoObstacle) {
-  const Walk walk(200, 0.02 * kDegree, 0.005, 4);
+  const WalkWithGnss walk(200, 0.02 * kDegree, 0.005, 4);
   std::vector<GnssObservation> observations = positions_of(walk, kGood, 6);
   observations.erase(observations.begin() + 60, observations.begin() + 140);
   for (GnssObservation& observation : observations) {
@@ -205,7 +200,7 @@ TEST(GnssFusion, TheStatedCovarianceIsHonest) {
   double squares = 0.0;
   constexpr int kWalks = 60;
   for (int seed = 1; seed <= kWalks; ++seed) {
-    const Walk walk(150, 0.0, 0.01, static_cast<std::uint64_t>(seed));
+    const WalkWithGnss walk(150, 0.0, 0.01, static_cast<std::uint64_t>(seed));
     const GnssFusionResult result = fuse_gnss(
         walk.problem, {}, positions_of(walk, kForest, static_cast<std::uint64_t>(1000 + seed)),
         walk.enu_from_world, kForest, {});
@@ -245,7 +240,7 @@ TEST(GnssFusion, SlowErrorsAreScaledAsTheReceiverStates) {
 }
 
 TEST(GnssFusion, WithoutPositionsThePathIsThatOfTheGuess) {
-  const Walk walk(20, 0.0, 0.0, 1);
+  const WalkWithGnss walk(20, 0.0, 0.0, 1);
   const GnssFusionResult result = fuse_gnss(walk.problem, {}, {}, walk.enu_from_world, kForest, {});
   EXPECT_FALSE(result.converged);
   EXPECT_LT(rms(result.enu_from_keyframe, walk.truth), 1e-6);

@@ -46,7 +46,7 @@ struct Stand {
 };
 
 // Views of 25 trees 4 m apart, a share of them seen, with noise.
-Stand stand(int views, double noise_m, unsigned seed) {
+Stand views_of_stand(int views, double noise_m, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0.0, noise_m);
   Stand result;
@@ -64,7 +64,7 @@ Stand stand(int views, double noise_m, unsigned seed) {
 }
 
 TEST(MapSharpness, RegistrationNoiseIsTheNoiseOfTheSights) {
-  const Stand seen = stand(80, 0.05, 1);
+  const Stand seen = views_of_stand(80, 0.05, 1);
   const RegistrationNoise noise = registration_noise(seen.views, seen.poses, {}, {});
   EXPECT_EQ(noise.trees, 25U);
   EXPECT_EQ(noise.sights, 2000U);
@@ -76,14 +76,14 @@ TEST(MapSharpness, RegistrationNoiseIsTheNoiseOfTheSights) {
     squares += value;
   EXPECT_NEAR(std::sqrt(squares / 2000.0), noise.pooled_m, 1e-12);
   // Fewer sights than a tree must have.
-  const Stand few = stand(14, 0.05, 1);
+  const Stand few = views_of_stand(14, 0.05, 1);
   EXPECT_EQ(registration_noise(few.views, few.poses, {}, {}).trees, 0U);
   EXPECT_TRUE(std::isnan(registration_noise(few.views, few.poses, {}, {}).pooled_m));
   EXPECT_TRUE(std::isnan(registration_noise(few.views, few.poses, {}, {}).clusters_m));
 }
 
 TEST(MapSharpness, TwoTreesSideBySideAreNoNoise) {
-  Stand seen = stand(80, 0.05, 4);
+  Stand seen = views_of_stand(80, 0.05, 4);
   const RegistrationNoise alone = registration_noise(seen.views, seen.poses, {}, {});
   // A neighbour 0.7 m beside the first tree: their sights run together.
   for (std::size_t v = 0; v < seen.views.size(); ++v)
@@ -102,7 +102,7 @@ TEST(MapSharpness, TwoTreesSideBySideAreNoNoise) {
   EXPECT_NEAR(noise.clusters_mean_m,
               (24.0 * std::sqrt(sight) + std::sqrt(sight + 0.5 * 0.7 * 0.7)) / 25.0, 0.003);
   // A tree that is seen where it is not, in half of the views, does count.
-  Stand bent = stand(80, 0.05, 4);
+  Stand bent = views_of_stand(80, 0.05, 4);
   for (std::size_t v = 0; v < 40; ++v)
     bent.poses[v] = Pose(Eigen::Quaterniond::Identity(), {0.4, 0.0, 0.0}) * bent.poses[v];
   const RegistrationNoise blurred = registration_noise(bent.views, bent.poses, {}, {});
@@ -111,7 +111,7 @@ TEST(MapSharpness, TwoTreesSideBySideAreNoNoise) {
 }
 
 TEST(MapSharpness, ViewsThatHurtAreFoundAndLeftOut) {
-  Stand seen = stand(60, 0.03, 2);
+  Stand seen = views_of_stand(60, 0.03, 2);
   for (const std::size_t bad : {7U, 31U})
     seen.poses[bad] = Pose(Eigen::Quaterniond::Identity(), {0.25, 0.1, 0.0}) * seen.poses[bad];
   const RegistrationNoise before = registration_noise(seen.views, seen.poses, {}, {});

@@ -11,12 +11,15 @@
 #include <sstream>
 
 #include "understory/graph/loops/loop_search.h"
+#include "understory/graph/test_covariance.h"
 #include "understory/util/angles.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
+
+using test::covariance;
 
 Pose noise(Random& random, double rotation, double translation) {
   Vector6d xi;
@@ -25,13 +28,6 @@ Pose noise(Random& random, double rotation, double translation) {
     xi[i + 3] = translation * random.normal();
   }
   return Pose::exp(xi);
-}
-
-Matrix6d covariance(double rotation, double translation) {
-  Matrix6d c = Matrix6d::Zero();
-  c.diagonal() << Eigen::Vector3d::Constant(rotation * rotation),
-      Eigen::Vector3d::Constant(translation * translation);
-  return c;
 }
 
 // Two rounds of a circle of 40 m diameter with keyframes every metre. Odometry has noise, and a

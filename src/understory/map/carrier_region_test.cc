@@ -16,7 +16,7 @@ const Eigen::Vector3d kLidar(0.5, 0.0, 2.0);
 
 // A body that goes along x over level ground, past a row of trunks and a wall. It has a post of its
 // own behind the lidar. Scans take 0.1 s and are deskewed.
-class CarrierTest : public testing::Test {
+class CarrierTest : public ::testing::Test {
  protected:
   static TimeNs time_of(int scan) { return 100'000'000LL * scan; }
   // Metres between two scans.

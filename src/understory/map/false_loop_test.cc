@@ -16,7 +16,7 @@ namespace {
 using testing::Stand;
 
 constexpr int kSteps = 60;
-constexpr double kRadiusM = 9.0;
+constexpr double kScanRadiusM = 9.0;
 constexpr double kSpacingM = 3.0;
 
 // Equal stems in rows on even ground: every place looks like that one spacing further on.
@@ -60,11 +60,11 @@ Points scan_at(const Stand& stand, const Pose& world_from_body, std::uint64_t se
 // The estimated pose of the walker.
 Pose estimated(int step) {
   const double angle = 2.0 * std::numbers::pi * step / kSteps * 1.05;
-  return {so3_exp({0.0, 0.0, angle}),
-          Eigen::Vector3d(kRadiusM * std::sin(angle), kRadiusM * (1.0 - std::cos(angle)), 1.7)};
+  return {so3_exp({0.0, 0.0, angle}), Eigen::Vector3d(kScanRadiusM * std::sin(angle),
+                                                      kScanRadiusM * (1.0 - std::cos(angle)), 1.7)};
 }
 
-struct Walk {
+struct SlippedWalk {
   std::vector<LoopAttempt> loops;  // tried from places wholly after the slip
   int used = 0;                    // of those, accepted by the graph
   std::vector<Keyframe> keyframes;
@@ -97,8 +97,8 @@ KeyframeMap::Config paper_config() {
 }
 
 // `slip`: from half way on the walker truly is that far from its estimated pose.
-Walk walk(const Stand& stand, const Eigen::Vector3d& slip,
-          const KeyframeMap::Config& config = own_config()) {
+SlippedWalk slipped_walk(const Stand& stand, const Eigen::Vector3d& slip,
+                         const KeyframeMap::Config& config = own_config()) {
   const test::TemporaryFolder folder;
   StageTimes times;
   Log log;
@@ -115,7 +115,7 @@ Walk walk(const Stand& stand, const Eigen::Vector3d& slip,
     if (now) moved = *now * moved;
   }
   map.finish();
-  Walk result;
+  SlippedWalk result;
   for (std::size_t i = 0; i < map.loops().size(); ++i) {
     if (map.loops()[i].to <= kSteps / 2 + 3) continue;
     result.loops.push_back(map.loops()[i]);
@@ -125,7 +125,7 @@ Walk walk(const Stand& stand, const Eigen::Vector3d& slip,
   return result;
 }
 
-void print(const Walk& result) {
+void print(const SlippedWalk& result) {
   if (std::getenv("UNDERSTORY_PRINT") == nullptr) return;
   for (const LoopAttempt& loop : result.loops) {
     std::printf("%d - %d: %s, %.2f m; %s\n", loop.from, loop.to, loop.verified ? "fits" : "no",
@@ -136,7 +136,7 @@ void print(const Walk& result) {
 // Shows that the walks below could have been closed: the place is the same, the belief 1 m off.
 TEST(FalseLoops, ATrueReturnIsClosed) {
   const Eigen::Vector3d slip(0.8, -0.6, 0.0);
-  const Walk result = walk(grown_stand(), slip);
+  const SlippedWalk result = slipped_walk(grown_stand(), slip);
   print(result);
   EXPECT_GT(result.used, 0);
   const Pose truth = Pose(Eigen::Quaterniond::Identity(), slip) * estimated(kSteps);
@@ -149,7 +149,7 @@ TEST(FalseLoops, ATrueReturnIsClosed) {
 // the slip that the odometry does not know of. Only its choice was the paper's before.
 TEST(FalseLoops, ThePapersLoopsTakeTheEdgeFromTheMatchToTheLocalMap) {
   const Eigen::Vector3d slip(0.8, -0.6, 0.0);
-  const Walk result = walk(grown_stand(), slip, paper_config());
+  const SlippedWalk result = slipped_walk(grown_stand(), slip, paper_config());
   print(result);
   ASSERT_GT(result.used, 0);
   for (const LoopAttempt& loop : result.loops) {
@@ -178,7 +178,7 @@ TEST(FalseLoops, ThePapersLoopsTakeTheEdgeFromTheMatchToTheLocalMap) {
   EXPECT_LT((found.translation() - truth.translation()).norm(), 0.25);
 }
 
-void expect_no_loop(const Walk& result) {
+void expect_no_loop(const SlippedWalk& result) {
   print(result);
   EXPECT_GT(result.loops.size(), 3U) << "nothing was tried";
   EXPECT_EQ(result.used, 0);
@@ -190,12 +190,12 @@ void expect_no_loop(const Walk& result) {
 }
 
 TEST(FalseLoops, AnotherPlaceOfAStandIsNone) {
-  expect_no_loop(walk(grown_stand(), {31.0, 12.0, 0.0}));
+  expect_no_loop(slipped_walk(grown_stand(), {31.0, 12.0, 0.0}));
 }
 
 // Rows fit rows at every multiple of their spacing, so the fit by itself says nothing.
 TEST(FalseLoops, RowsOfAPlantationAreNone) {
-  expect_no_loop(walk(plantation(), {8.0 * kSpacingM + 1.2, 1.0, 0.0}));
+  expect_no_loop(slipped_walk(plantation(), {8.0 * kSpacingM + 1.2, 1.0, 0.0}));
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 namespace understory {
 namespace {
 
-struct Walk {
+struct WalkPastTrees {
   std::vector<StemView> views;
   std::vector<Pose> poses;
   std::vector<MappedStem> trees;
@@ -13,8 +13,8 @@ struct Walk {
 
 // 60 views all around along 12 m; `sees(view, tree)` says what each sees.
 template <typename Sees>
-Walk walk(const std::vector<Eigen::Vector3d>& trees, const Sees& sees) {
-  Walk result;
+WalkPastTrees walk_past(const std::vector<Eigen::Vector3d>& trees, const Sees& sees) {
+  WalkPastTrees result;
   for (const Eigen::Vector3d& place : trees) {
     result.trees.emplace_back();
     result.trees.back().point_in_world = place;
@@ -44,7 +44,7 @@ std::vector<Eigen::Vector3d> stand() {
 TEST(FelledTrees, TellsWhichTreeFellAndWhen) {
   const auto trees = stand();
   // Tree 14 is cut at view 33; each is missed now and then, tree 25 more often than seen.
-  const Walk seen = walk(trees, [](int i, std::size_t t) {
+  const WalkPastTrees seen = walk_past(trees, [](int i, std::size_t t) {
     if (t == 14) return i < 33 && i % 5 != 2;
     if (t == 25) return i % 4 == 0 && i < 44;
     return (i + static_cast<int>(t)) % 6 != 0;
@@ -62,7 +62,7 @@ TEST(FelledTrees, WhatIsHiddenOrOutOfReachIsNotFelled) {
   auto trees = stand();
   // A new stem, the one that the machine holds, comes before tree 14 and goes along with it.
   const Eigen::Vector3d hidden = trees[14];
-  Walk seen = walk(trees, [](int i, std::size_t t) { return t != 14 || i < 30; });
+  WalkPastTrees seen = walk_past(trees, [](int i, std::size_t t) { return t != 14 || i < 30; });
   EXPECT_EQ(felled_trees(seen.views, seen.poses, seen.trees, {}).size(), 1U);
   for (std::size_t i = 30; i < 60; ++i) {
     Stem held;
@@ -72,7 +72,8 @@ TEST(FelledTrees, WhatIsHiddenOrOutOfReachIsNotFelled) {
   EXPECT_TRUE(felled_trees(seen.views, seen.poses, seen.trees, {}).empty());
   FelledConfig near;
   near.reach_m = 2.0;
-  const Walk far = walk(trees, [](int i, std::size_t t) { return t != 14 || i < 30; });
+  const WalkPastTrees far =
+      walk_past(trees, [](int i, std::size_t t) { return t != 14 || i < 30; });
   EXPECT_TRUE(felled_trees(far.views, far.poses, far.trees, near).empty());
   EXPECT_TRUE(felled_trees({}, {}, {}, {}).empty());
 }
@@ -83,7 +84,7 @@ TEST(FelledTrees, WhereNobodyFellsOnlyPlacesThatShowedTheTreeTell) {
   const auto trees = stand();
   const FelledConfig unattended = FelledConfig::unattended();
   const auto before = [](int i, std::size_t t) { return t != 14 || i < 30; };
-  Walk once = walk(trees, before);
+  WalkPastTrees once = walk_past(trees, before);
   EXPECT_EQ(felled_trees(once.views, once.poses, once.trees, {}).size(), 1U);
   // Beyond 3 m from the last place that showed it: 12 m are walked in 60 views.
   for (std::size_t i = 30; i < 60; ++i)
@@ -98,8 +99,8 @@ TEST(FelledTrees, WhereNobodyFellsOnlyPlacesThatShowedTheTreeTell) {
   }
   EXPECT_EQ(felled_trees(once.views, once.poses, once.trees, {}).size(), 1U);
   EXPECT_TRUE(felled_trees(once.views, once.poses, once.trees, unattended).empty());
-  Walk again = once;
-  const Walk first = walk(trees, [](int, std::size_t t) { return t != 14; });
+  WalkPastTrees again = once;
+  const WalkPastTrees first = walk_past(trees, [](int, std::size_t t) { return t != 14; });
   again.views.insert(again.views.end(), first.views.begin(), first.views.end());
   again.poses.insert(again.poses.end(), first.poses.begin(), first.poses.end());
   const auto gone = felled_trees(again.views, again.poses, again.trees, unattended);

@@ -8,7 +8,7 @@
 namespace understory {
 namespace {
 
-struct Walk {
+struct TiltedWalk {
   std::vector<StemView> views;
   std::vector<Pose> poses;
 };
@@ -16,8 +16,8 @@ struct Walk {
 // 100 views from 1.5 m above a slope of 10 %, tilted by 6 degrees. `lift_m(view)` moves all feet of
 // a view down, as a terrain model below the ground does.
 template <typename Lift>
-Walk walk(const Lift& lift_m, int feet = 6) {
-  Walk result;
+TiltedWalk tilted_walk(const Lift& lift_m, int feet = 6) {
+  TiltedWalk result;
   for (int i = 0; i < 100; ++i) {
     const Pose pose(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX())),
                     {1.0 * i, 0.0, 0.1 * i + 1.5});
@@ -42,7 +42,7 @@ Walk walk(const Lift& lift_m, int feet = 6) {
 }
 
 TEST(CarriedHeight, IsThatAboveTheFeetOnASlope) {
-  const Walk level = walk([](int) { return 0.0; });
+  const TiltedWalk level = tilted_walk([](int) { return 0.0; });
   const auto carried = carried_height(level.views, level.poses);
   ASSERT_TRUE(carried.has_value());
   EXPECT_EQ(carried->views, 100);
@@ -52,7 +52,7 @@ TEST(CarriedHeight, IsThatAboveTheFeetOnASlope) {
 }
 
 TEST(CarriedHeight, FeetBelowAHilltopAreNoFeet) {
-  const Walk hill = walk([](int i) { return i < 50 ? 0.0 : 0.1 * (i - 50); });
+  const TiltedWalk hill = tilted_walk([](int i) { return i < 50 ? 0.0 : 0.1 * (i - 50); });
   const auto carried = carried_height(hill.views, hill.poses);
   ASSERT_TRUE(carried.has_value());
   // 5 % of 100 views lie below the first height and above the last one.
@@ -61,7 +61,7 @@ TEST(CarriedHeight, FeetBelowAHilltopAreNoFeet) {
 }
 
 TEST(CarriedHeight, TellsNothingWhereFewStemsAreNear) {
-  const Walk open = walk([](int) { return 0.0; }, 2);
+  const TiltedWalk open = tilted_walk([](int) { return 0.0; }, 2);
   EXPECT_FALSE(carried_height(open.views, open.poses).has_value());
   EXPECT_FALSE(carried_height({}, {}).has_value());
 }

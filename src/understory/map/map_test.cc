@@ -273,7 +273,7 @@ std::vector<LocalMapInsertion> walk_of(std::size_t keyframes) {
 }
 
 // A slab of points around each place; the walk goes 2 m a keyframe.
-void walk(LocalMap& map, const std::vector<LocalMapInsertion>& insertions) {
+void walk_through(LocalMap& map, const std::vector<LocalMapInsertion>& insertions) {
   for (const LocalMapInsertion& insertion : insertions) {
     FeaturePoints cloud;
     for (int x = -30; x <= 30; ++x) {
@@ -291,11 +291,11 @@ void walk(LocalMap& map, const std::vector<LocalMapInsertion>& insertions) {
 TEST(LocalMapWithinMemory, ItsRadiusShrinksUntilItFitsAndTheSameInsertionsMakeItAgain) {
   LocalMapConfig config;
   LocalMap whole(config);
-  walk(whole, walk_of(57));
+  walk_through(whole, walk_of(57));
   EXPECT_EQ(whole.radius_m(), config.radius_m);
   config.most_bytes = 0.6 * whole.bytes();
   LocalMap fitted(config);
-  walk(fitted, walk_of(57));  // the last insertion forgets
+  walk_through(fitted, walk_of(57));  // the last insertion forgets
   EXPECT_LE(fitted.bytes(), config.most_bytes);
   EXPECT_LT(fitted.radius_m(), config.radius_m);
   EXPECT_GE(fitted.radius_m(), 20.0);
@@ -304,16 +304,16 @@ TEST(LocalMapWithinMemory, ItsRadiusShrinksUntilItFitsAndTheSameInsertionsMakeIt
   const double radius_m = fitted.radius_m();
   fitted.clear();
   EXPECT_EQ(fitted.first_radius_m(), radius_m);
-  walk(fitted, walk_of(33));
+  walk_through(fitted, walk_of(33));
   LocalMap again(config);
   again.set_radius(fitted.first_radius_m());
-  walk(again, walk_of(33));
+  walk_through(again, walk_of(33));
   EXPECT_EQ(again.radius_m(), fitted.radius_m());
   EXPECT_EQ(again.snapshot()->size(), fitted.snapshot()->size());
   // An open place: the radius comes back.
   fitted.clear();
   for (int round = 0; round < 30; ++round)
-    walk(fitted, {{0, 1}});
+    walk_through(fitted, {{0, 1}});
   EXPECT_EQ(fitted.radius_m(), config.radius_m);
 }
 

@@ -9,7 +9,7 @@ namespace understory {
 namespace {
 
 // One keyframe every half metre along x.
-std::vector<Keyframe> walk(std::size_t count) {
+std::vector<Keyframe> straight_walk(std::size_t count) {
   std::vector<Keyframe> keyframes(count);
   for (std::size_t i = 0; i < count; ++i) {
     keyframes[i].world_from_body =
@@ -19,7 +19,7 @@ std::vector<Keyframe> walk(std::size_t count) {
 }
 
 TEST(RangeCheck, PairsLieApartWithinASegment) {
-  const std::vector<Keyframe> keyframes = walk(60);
+  const std::vector<Keyframe> keyframes = straight_walk(60);
   const std::vector<std::uint64_t> segments = {0, 20};
   RangeCheckConfig config;
   config.apart_m = 6.0;
@@ -40,7 +40,7 @@ TEST(RangeCheck, PairsLieApartWithinASegment) {
   const auto some = pairs_of_views(keyframes, segments, config);
   ASSERT_EQ(some.size(), 3U);
   EXPECT_EQ(some.front(), pairs.front());
-  EXPECT_TRUE(pairs_of_views(walk(12), std::vector<std::uint64_t>{0}, config).empty());
+  EXPECT_TRUE(pairs_of_views(straight_walk(12), std::vector<std::uint64_t>{0}, config).empty());
 }
 
 RangeOffset pair(double offset_m, double sd_m) {
@@ -80,7 +80,7 @@ TEST(RangeCheck, TheStandardErrorComesFromTheSpread) {
 }
 
 TEST(RangeCheck, FindsWhatAllRangesOfAWalkAreTooLong) {
-  const std::vector<Keyframe> keyframes = walk(32);
+  const std::vector<Keyframe> keyframes = straight_walk(32);
   const std::vector<std::uint64_t> segments = {0};
   testing::Stand stand = testing::make_stand(testing::StandOptions(), 11);
   stand.bump_m = 0.3;

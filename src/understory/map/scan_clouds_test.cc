@@ -21,11 +21,11 @@ BodyCloud row_of(std::size_t points) {
   return cloud;
 }
 
-Pose at(double x) {
+Pose pose_along_x(double x) {
   return Pose(Eigen::Quaterniond::Identity(), {x, 0.0, 0.0});
 }
 
-class ScanCloudsTest : public testing::Test {
+class ScanCloudsTest : public ::testing::Test {
  protected:
   ScanCloudsTest() {
     config_.range_min_m = 1.5;
@@ -40,20 +40,20 @@ class ScanCloudsTest : public testing::Test {
 
 TEST_F(ScanCloudsTest, KeepsScansThatLieFarEnoughFromTheLastOneKept) {
   ScanClouds clouds(config_, folder_ / "clouds", times_);
-  clouds.offer(row_of(8), at(0.0), 0, at(0.0), keyframes_);
-  clouds.offer(row_of(8), at(0.9), 0, at(0.9), keyframes_);
-  clouds.offer(row_of(8), at(1.1), 0, at(1.1), keyframes_);
+  clouds.offer(row_of(8), pose_along_x(0.0), 0, pose_along_x(0.0), keyframes_);
+  clouds.offer(row_of(8), pose_along_x(0.9), 0, pose_along_x(0.9), keyframes_);
+  clouds.offer(row_of(8), pose_along_x(1.1), 0, pose_along_x(1.1), keyframes_);
   ASSERT_EQ(clouds.clouds().size(), 2U);
   EXPECT_EQ(clouds.clouds().read(1).keyframe_from_body.translation().x(), 1.1);
   // The keyframe was moved, and the last cloud with it.
-  keyframes_[0].world_from_body = at(3.0);
-  clouds.offer(row_of(8), at(4.5), 0, at(1.5), keyframes_);
+  keyframes_[0].world_from_body = pose_along_x(3.0);
+  clouds.offer(row_of(8), pose_along_x(4.5), 0, pose_along_x(1.5), keyframes_);
   EXPECT_EQ(clouds.clouds().size(), 2U);
 }
 
 TEST_F(ScanCloudsTest, KeepsPointsInRangeWithTheirTimes) {
   ScanClouds clouds(config_, folder_ / "clouds", times_);
-  clouds.offer(row_of(8), at(0.0), 0, at(0.0), keyframes_);
+  clouds.offer(row_of(8), pose_along_x(0.0), 0, pose_along_x(0.0), keyframes_);
   const KeyframeCloud kept = clouds.clouds().read(0);
   ASSERT_EQ(kept.points.size(), 4U);  // at 2, 3, 4 and 5 m
   EXPECT_EQ(kept.stamp, 5);
@@ -65,7 +65,7 @@ TEST_F(ScanCloudsTest, KeepsPointsInRangeWithTheirTimes) {
 TEST_F(ScanCloudsTest, ThinsACloud) {
   config_.thin_m = 2.0;
   ScanClouds clouds(config_, folder_ / "clouds", times_);
-  clouds.offer(row_of(8), at(0.0), 0, at(0.0), keyframes_);
+  clouds.offer(row_of(8), pose_along_x(0.0), 0, pose_along_x(0.0), keyframes_);
   EXPECT_EQ(clouds.clouds().read(0).points.size(), 2U);  // at 2 and 4 m
 }
 
@@ -74,15 +74,15 @@ TEST_F(ScanCloudsTest, GoesOnWhereItWas) {
   ScanClouds::Last last;
   {
     ScanClouds clouds(config_, folder_ / "clouds", times_);
-    clouds.offer(row_of(8), at(2.0), 0, at(2.0), keyframes_);
+    clouds.offer(row_of(8), pose_along_x(2.0), 0, pose_along_x(2.0), keyframes_);
     clouds.sync();
     known = clouds.clouds().count();
     last = clouds.last();
   }
   ScanClouds clouds(config_, folder_ / "clouds", known, last, times_);
-  clouds.offer(row_of(8), at(2.5), 0, at(2.5), keyframes_);
+  clouds.offer(row_of(8), pose_along_x(2.5), 0, pose_along_x(2.5), keyframes_);
   EXPECT_EQ(clouds.clouds().size(), 1U);
-  clouds.offer(row_of(8), at(3.5), 0, at(3.5), keyframes_);
+  clouds.offer(row_of(8), pose_along_x(3.5), 0, pose_along_x(3.5), keyframes_);
   EXPECT_EQ(clouds.clouds().size(), 2U);
 }
 

@@ -63,7 +63,7 @@ TEST(Journal, ReopeningKeepsWhatTheCheckpointKnows) {
   EXPECT_THROW(Journal(path, more), InputError);
 }
 
-class CheckpointTest : public testing::Test {
+class CheckpointTest : public ::testing::Test {
  protected:
   std::vector<std::string> read() {
     problems_.clear();

@@ -11,7 +11,7 @@
 namespace understory {
 namespace {
 
-void add(Scan& scan, const Eigen::Vector3d& direction, double range, double t_s) {
+void add_return(Scan& scan, const Eigen::Vector3d& direction, double range, double t_s) {
   const Eigen::Vector3d p = range * direction;
   ScanPoint point;
   point.x = static_cast<float>(p.x());
@@ -30,7 +30,8 @@ Scan spinning(int beams, bool at_once, const Eigen::Matrix3d& mount) {
       if (random.uniform(0.0, 1.0) < 0.4) continue;
       const double azimuth = 2.0 * M_PI * column / 900.0;
       const double elevation = (beam * 7 % beams - 0.5 * beams) * 0.7 / beams;
-      add(scan,
+      add_return(
+          scan,
           mount * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
                                   std::cos(elevation) * std::sin(azimuth), std::sin(elevation)),
           random.uniform(3.0, 30.0), (column + (at_once ? 0.0 : 0.9 * beam / beams)) / 9000.0);
@@ -49,7 +50,8 @@ Scan rosette() {
     const double b = -2.0 * M_PI * 77.3 * t;
     const Eigen::Vector2d at(0.31 * (std::cos(a) + std::cos(b)),
                              0.31 * (std::sin(a) + std::sin(b)));
-    add(scan, Eigen::Vector3d(1.0, at.x(), at.y()).normalized(), random.uniform(3.0, 30.0), t);
+    add_return(scan, Eigen::Vector3d(1.0, at.x(), at.y()).normalized(), random.uniform(3.0, 30.0),
+               t);
   }
   return scan;
 }

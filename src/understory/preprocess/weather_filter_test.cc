@@ -21,7 +21,7 @@ WeatherFilterConfig switched_on() {
   return config;
 }
 
-void add(BodyCloud& cloud, const Vector3f& point, float intensity) {
+void add_point(BodyCloud& cloud, const Vector3f& point, float intensity) {
   cloud.points.push_back(point);
   cloud.intensity.push_back(intensity);
   cloud.range.push_back(point.norm());
@@ -34,10 +34,10 @@ BodyCloud wall() {
   BodyCloud cloud;
   for (int row = 0; row < 20; ++row) {
     for (int column = 0; column < 40; ++column)
-      add(cloud,
-          {10.0F, -2.0F + 0.1F * static_cast<float>(column),
-           -1.0F + 0.1F * static_cast<float>(row)},
-          (row + column) % 5 == 0 ? 20.0F : 100.0F);
+      add_point(cloud,
+                {10.0F, -2.0F + 0.1F * static_cast<float>(column),
+                 -1.0F + 0.1F * static_cast<float>(row)},
+                (row + column) % 5 == 0 ? 20.0F : 100.0F);
   }
   return cloud;
 }
@@ -65,9 +65,9 @@ TEST(WeatherFilter, JudgesScansWithIntensitiesWhereItIsEnabled) {
 TEST(WeatherFilter, DarkReturnsThatStandAloneGoAndNothingElse) {
   BodyCloud cloud = wall();
   const std::size_t of_wall = cloud.size();
-  add(cloud, {5.0F, 0.0F, 0.0F}, 8.0F);    // a flake
-  add(cloud, {5.0F, 2.0F, 0.0F}, 100.0F);  // as bright as the wall
-  add(cloud, {30.0F, 9.0F, 3.0F}, 2.0F);
+  add_point(cloud, {5.0F, 0.0F, 0.0F}, 8.0F);    // a flake
+  add_point(cloud, {5.0F, 2.0F, 0.0F}, 100.0F);  // as bright as the wall
+  add_point(cloud, {30.0F, 9.0F, 3.0F}, 2.0F);
   WeatherFilter filter(switched_on());
   EXPECT_EQ(filter.drop(cloud, Pose()), 2U);
   ASSERT_EQ(cloud.size(), of_wall + 1);
@@ -79,8 +79,8 @@ TEST(WeatherFilter, DarkReturnsThatStandAloneGoAndNothingElse) {
 
 TEST(WeatherFilter, PointsKeepTheirMarks) {
   BodyCloud cloud = wall();
-  add(cloud, {5.0F, 0.0F, 0.0F}, 8.0F);  // a flake
-  add(cloud, {5.0F, 2.0F, 0.0F}, 100.0F);
+  add_point(cloud, {5.0F, 0.0F, 0.0F}, 8.0F);  // a flake
+  add_point(cloud, {5.0F, 2.0F, 0.0F}, 100.0F);
   cloud.carried.assign(cloud.size(), 0);
   cloud.carried.back() = 1;
   WeatherFilter filter(switched_on());
@@ -97,18 +97,18 @@ TEST(WeatherFilter, WhatWasThereBeforeStays) {
   for (const bool was_there : {true, false}) {
     WeatherFilter filter(switched_on());
     BodyCloud first = moved(wall(), before.inverse());
-    if (was_there) add(first, (before.inverse() * twig.cast<double>()).cast<float>(), 8.0F);
+    if (was_there) add_point(first, (before.inverse() * twig.cast<double>()).cast<float>(), 8.0F);
     filter.drop(first, before);
     filter.remember(before);
     BodyCloud second = wall();
-    add(second, twig, 8.0F);
+    add_point(second, twig, 8.0F);
     EXPECT_EQ(filter.drop(second, Pose()), was_there ? 0U : 1U);
   }
 }
 
 TEST(WeatherFilter, WithoutIntensitiesOrSwitchedOffNothingGoes) {
   BodyCloud cloud = wall();
-  add(cloud, {5.0F, 0.0F, 0.0F}, 8.0F);
+  add_point(cloud, {5.0F, 0.0F, 0.0F}, 8.0F);
   EXPECT_EQ(WeatherFilter(WeatherFilterConfig{}).drop(cloud, Pose()), 0U);
   std::fill(cloud.intensity.begin(), cloud.intensity.end(), 7.0F);
   EXPECT_EQ(WeatherFilter(switched_on()).drop(cloud, Pose()), 0U);
@@ -116,15 +116,15 @@ TEST(WeatherFilter, WithoutIntensitiesOrSwitchedOffNothingGoes) {
   EXPECT_EQ(WeatherFilter(switched_on()).drop(empty, Pose()), 0U);
 }
 
-BodyCloud random_cloud(std::uint64_t seed) {
+BodyCloud cloud_of_random_ranges(std::uint64_t seed) {
   Random random(seed);
   BodyCloud cloud;
   for (int i = 0; i < 3000; ++i) {
     const Vector3f towards(static_cast<float>(random.normal()), static_cast<float>(random.normal()),
                            static_cast<float>(0.3 * random.normal()));
     const double range = std::exp(random.uniform(-0.5, 4.0));
-    add(cloud, static_cast<float>(range) * towards.normalized(),
-        static_cast<float>(random.uniform(0.0, 100.0)));
+    add_point(cloud, static_cast<float>(range) * towards.normalized(),
+              static_cast<float>(random.uniform(0.0, 100.0)));
   }
   return cloud;
 }
@@ -140,8 +140,8 @@ double share(const BodyCloud& among, const Vector3f& place, double range, std::s
 }
 
 TEST(WeatherFilter, IsTheRuleOverAllPoints) {
-  const BodyCloud before = random_cloud(3);
-  const BodyCloud now = random_cloud(4);
+  const BodyCloud before = cloud_of_random_ranges(3);
+  const BodyCloud now = cloud_of_random_ranges(4);
   std::vector<float> sorted = now.intensity;
   std::sort(sorted.begin(), sorted.end());
   const double bright = sorted[static_cast<std::size_t>(0.9 * 2999.0)];
@@ -172,7 +172,7 @@ TEST(WeatherFilter, IsTheSameAfterItWasSavedAndWithTheWorldMoved) {
   const Pose place(Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitX())),
                    Eigen::Vector3d(3.0, -2.0, 1.0));
   WeatherFilter filter(switched_on());
-  BodyCloud first = random_cloud(5);
+  BodyCloud first = cloud_of_random_ranges(5);
   filter.drop(first, Pose());
   filter.remember(Pose());
   BinaryWriter writer;
@@ -181,7 +181,7 @@ TEST(WeatherFilter, IsTheSameAfterItWasSavedAndWithTheWorldMoved) {
   WeatherFilter again(switched_on());
   again.load(reader);
   again.move_world(place);
-  BodyCloud one = random_cloud(6);
+  BodyCloud one = cloud_of_random_ranges(6);
   BodyCloud two = one;
   filter.drop(one, Pose());
   again.drop(two, place);

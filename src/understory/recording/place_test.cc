@@ -18,20 +18,39 @@
 namespace understory {
 namespace {
 
-using namespace test;
+using test::add_record;
+using test::Bytes;
+using test::data_folder;
+using test::Drive;
+using test::kHourStart;
+using test::make_drive;
+using test::make_ethernet;
+using test::make_ip;
+using test::make_udp;
+using test::nmea_line;
+using test::pcap_header;
+using test::put;
+using test::read_all;
+using test::read_bytes;
+using test::small_chunks;
+using test::TemporaryFolder;
+using test::velodyne_udp;
+using test::write_bytes;
+using test::write_drive;
+
 using Open = std::function<std::unique_ptr<Recording>(Log&)>;
 
 Open opening(const std::string& path) {
   return [path](Log& log) { return open_recording(path, {}, log); };
 }
 
-std::string bytes_of(const Event& event) {
+std::string saved_bytes(const Event& event) {
   BinaryWriter writer;
   put_event(writer, event);
   return writer.bytes();
 }
 
-std::string bytes_of(const Rig& rig) {
+std::string saved_bytes(const Rig& rig) {
   BinaryWriter writer;
   put_rig(writer, rig);
   return writer.bytes();
@@ -39,7 +58,7 @@ std::string bytes_of(const Rig& rig) {
 
 void expect_same_end(const Recording& a, const Recording& b) {
   EXPECT_EQ(a.format(), b.format());
-  EXPECT_EQ(bytes_of(a.rig()), bytes_of(b.rig()));
+  EXPECT_EQ(saved_bytes(a.rig()), saved_bytes(b.rig()));
   const std::vector<TopicReport> first = a.topics();
   const std::vector<TopicReport> second = b.topics();
   ASSERT_EQ(first.size(), second.size());
@@ -73,7 +92,7 @@ void expect_goes_on(const Open& open, const std::vector<Event>& events, const Re
   for (std::size_t i = count; i < events.size(); ++i) {
     const auto event = second->next();
     ASSERT_TRUE(event);
-    ASSERT_EQ(bytes_of(events[i]), bytes_of(*event)) << "event " << i;
+    ASSERT_EQ(saved_bytes(events[i]), saved_bytes(*event)) << "event " << i;
   }
   EXPECT_FALSE(second->next());
   expect_same_end(whole, *second);
@@ -87,12 +106,6 @@ void expect_goes_on(const Open& open) {
   for (std::size_t count = 0; count < events.size(); count += 1 + events.size() / 9)
     expect_goes_on(open, events, *whole, count);
   expect_goes_on(open, events, *whole, events.size());
-}
-
-McapWriterOptions small_chunks() {
-  McapWriterOptions options;
-  options.chunk_size_bytes = 20'000;
-  return options;
 }
 
 class Places : public ::testing::Test {
@@ -208,15 +221,6 @@ TEST_F(Places, OfFilesWithFlippedBits) {
     }
   }
   EXPECT_GT(tried, 200);
-}
-
-constexpr TimeNs kHourStart = 1'700'002'800 * kNsPerSecond;
-
-Bytes velodyne_udp(int i) {
-  VelodynePacket packet;
-  packet.azimuth_cdeg = (480 * i) % 36000;
-  packet.us = static_cast<std::uint32_t>(1327 * i);
-  return make_udp(2368, make_packet(packet));
 }
 
 // Five turns, every packet in two parts, with a stray part in between that is never completed.

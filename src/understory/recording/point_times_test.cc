@@ -12,7 +12,8 @@
 namespace understory {
 namespace {
 
-using namespace test;
+using test::kStart;
+
 using Kind = TimeConvention::Kind;
 using Stamp = TimeConvention::Stamp;
 
@@ -87,17 +88,17 @@ void store(double value, FieldType type, std::uint8_t* raw) {
   if (type == FieldType::kFloat64) put(value);
 }
 
-constexpr int kPoints = 200;
+constexpr int kTimedPoints = 200;
 
 TimeNs offset_of(int point) {
-  return (kPeriod - 1'000'000) * point / (kPoints - 1);
+  return (kPeriod - 1'000'000) * point / (kTimedPoints - 1);
 }
 
 RawCloud make_cloud(const Style& style, TimeNs start) {
   RawCloud cloud;
   constexpr std::uint32_t kStep = 24;
-  cloud.bytes.resize(kStep * kPoints);
-  for (int i = 0; i < kPoints; ++i) {
+  cloud.bytes.resize(kStep * kTimedPoints);
+  for (int i = 0; i < kTimedPoints; ++i) {
     std::uint8_t* raw = cloud.bytes.data() + kStep * i;
     const float xyz[3] = {1.0F + static_cast<float>(i), 2.0F, 3.0F};
     std::memcpy(raw, xyz, sizeof xyz);
@@ -106,13 +107,13 @@ RawCloud make_cloud(const Style& style, TimeNs start) {
   PointCloud2Message& message = cloud.message;
   message.header.stamp = style.stamp == Stamp::kLastPoint ? start + kPeriod - 1'000'000 : start;
   message.height = 1;
-  message.width = kPoints;
+  message.width = kTimedPoints;
   message.fields = {{"x", 0, FieldType::kFloat32, 1},
                     {"y", 4, FieldType::kFloat32, 1},
                     {"z", 8, FieldType::kFloat32, 1},
                     {"timestamp", 16, style.type, 1}};
   message.point_step = kStep;
-  message.row_step = kStep * kPoints;
+  message.row_step = kStep * kTimedPoints;
   message.data = cloud.bytes;
   return cloud;
 }
@@ -142,10 +143,10 @@ TEST_P(PointTimes, AreUnderstood) {
   const RawCloud cloud = make_cloud(style, start);
   const ConvertedCloud converted =
       convert_cloud(cloud.message, *CloudLayout::find(cloud.message), convention);
-  ASSERT_EQ(converted.scan->points.size(), static_cast<std::size_t>(kPoints));
+  ASSERT_EQ(converted.scan->points.size(), static_cast<std::size_t>(kTimedPoints));
   EXPECT_TRUE(converted.scan->has_point_times);
   // The coarsest of them, microseconds since the hour, starts within one of the first point.
-  for (int i = 0; i < kPoints; ++i) {
+  for (int i = 0; i < kTimedPoints; ++i) {
     const TimeNs time = converted.scan->stamp + converted.scan->points[i].t_ns;
     ASSERT_NEAR(static_cast<double>(time - start - offset_of(i)), 0.0, 2'000.0) << "point " << i;
   }

@@ -13,7 +13,12 @@
 namespace understory {
 namespace {
 
-using namespace test;
+using test::all_warnings;
+using test::count_of;
+using test::kStart;
+using test::make_scan;
+using test::TemporaryFolder;
+using test::write_bytes;
 
 // An IMU that is carried with tilts to all sides: attitude and its rate in closed form.
 ImuSample carried_sample(int i) {

@@ -113,6 +113,14 @@ inline void write_drive(const std::string& path, const Drive& drive,
   writer.finish();
 }
 
+// Many chunks in a short file.
+inline McapWriterOptions small_chunks(McapCompression compression = McapCompression::kZstd) {
+  McapWriterOptions options;
+  options.compression = compression;
+  options.chunk_size_bytes = 20'000;
+  return options;
+}
+
 inline std::vector<Event> read_all(Recording& recording) {
   std::vector<Event> events;
   while (auto event = recording.next())

@@ -14,7 +14,7 @@ namespace {
 using Place = CellBlocks::Place;
 
 // Cells around the origin, some of them taken away again, beside a plain map of the same.
-struct Pair {
+struct BlocksAndMap {
   CellBlocks blocks;
   std::map<Place, std::uint32_t> plain;
 };
@@ -24,8 +24,8 @@ Place random_place(Random& random) {
   return {one(), one(), one()};
 }
 
-Pair random_cells(Random& random) {
-  Pair pair;
+BlocksAndMap random_cells(Random& random) {
+  BlocksAndMap pair;
   for (std::uint32_t i = 0; i < 900; ++i) {
     const Place at = random_place(random);
     pair.blocks.set(at, i);
@@ -44,7 +44,7 @@ int steps_apart(const Place& a, const Place& b) {
 
 TEST(CellBlocks, FindTheCellsNearAPlace) {
   Random random(4);
-  const Pair pair = random_cells(random);
+  const BlocksAndMap pair = random_cells(random);
   ASSERT_GT(pair.plain.size(), 500U);
   std::vector<Place> places;
   for (const auto& [at, own] : pair.plain)
@@ -70,7 +70,7 @@ TEST(CellBlocks, FindTheCellsNearAPlace) {
 
 TEST(CellBlocks, TellWhatAChangeAffects) {
   Random random(5);
-  Pair pair = random_cells(random);
+  BlocksAndMap pair = random_cells(random);
   const auto reach_of = [](std::uint32_t cell) { return static_cast<int>(cell % 4); };
   for (int round = 0; round < 20; ++round) {
     std::vector<Place> changed;

@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
-#include <array>
-#include <cmath>
 #include <set>
 
 #include "understory/registration/test_stand.h"
@@ -15,21 +13,8 @@
 namespace understory {
 namespace {
 
-Pose upright(double x, double y, double z, double yaw = 0.0) {
-  return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())),
-          Eigen::Vector3d(x, y, z)};
-}
-
-// The first point in each cube of 0.2 m.
-Points thin(const Points& points) {
-  std::set<std::array<int, 3>> seen;
-  Points kept;
-  for (const Eigen::Vector3f& p : points) {
-    const auto cube = [](float v) { return static_cast<int>(std::floor(v / 0.2F)); };
-    if (seen.insert({cube(p.x()), cube(p.y()), cube(p.z())}).second) kept.push_back(p);
-  }
-  return kept;
-}
+using testing::thin;
+using testing::upright;
 
 Vector6d step(double rotation_rad, double translation_m) {
   Vector6d tangent;
@@ -47,7 +32,7 @@ class AnyMatcher : public ::testing::TestWithParam<std::string> {
     pattern_.columns = 512;
     stand_ = testing::make_stand({.half_width_m = 20.0, .crowns = false}, 3);
     stand_.bump_m = 0.3;
-    source_ = thin(scan(truth_, 99));
+    source_ = thin(scan(truth_, 99), 0.2F);
   }
 
   [[nodiscard]] Points scan(const Pose& world_from_sensor, std::uint64_t seed) const {
@@ -114,7 +99,7 @@ TEST_P(AnyMatcher, FindsAScanInASingleCloud) {
   const auto matcher = make_matcher(config_);
   const Pose pose = upright(1.0, 0.0, 1.6);
   const Points cloud = scan(pose, 5);
-  const auto target = matcher->make_target(matcher->sums_up_points() ? cloud : thin(cloud));
+  const auto target = matcher->make_target(matcher->sums_up_points() ? cloud : thin(cloud, 0.2F));
   RegistrationResult result = target->match(
       source_, pose.inverse() * truth_ * Pose::exp(step(0.005, 0.05)), {}, MatchStart::kFar);
   result.target_from_source = pose * result.target_from_source;
@@ -182,8 +167,8 @@ TEST_P(AnyMatcher, ForgetsWhatIsFar) {
   const RegistrationResult here = target->match(source_, truth_, {}, MatchStart::kNear);
   EXPECT_EQ(here.status, RegistrationStatus::kTooFewMatches) << here.reason;
   EXPECT_EQ(here.target_from_source.matrix(), truth_.matrix());
-  EXPECT_TRUE(
-      target->match(thin(scan(upright(0.0, 0.0, 1.6), 8)), far, {}, MatchStart::kNear).usable());
+  EXPECT_TRUE(target->match(thin(scan(upright(0.0, 0.0, 1.6), 8), 0.2F), far, {}, MatchStart::kNear)
+                  .usable());
 }
 
 TEST_P(AnyMatcher, SaysWhatItTakesAndForgetsAroundAPlace) {
@@ -224,7 +209,7 @@ TEST_P(AnyMatcher, TermsHoldWhatTheMatchLeavesOpen) {
   const auto builder = make_matcher(config_)->make_builder({});
   builder->insert(scan(pose, 1), pose, std::nullopt);
   const MatchTargetPtr target = builder->snapshot();
-  const Points source = thin(scan(pose, 2));
+  const Points source = thin(scan(pose, 2), 0.2F);
   const Pose guess = upright(0.1, 0.05, 1.62);
   const Eigen::Vector3d lever(0.5, 0.0, 0.4);
   const PositionPrior fix{{0.8, -0.2, 2.0}, lever, 1e4 * Eigen::Matrix3d::Identity()};

@@ -33,7 +33,7 @@ Pose some_pose(int i) {
   return Pose::exp(tangent);
 }
 
-double apart(const Pose& a, const Pose& b) {
+double pose_difference(const Pose& a, const Pose& b) {
   return right_difference(a, b).norm();
 }
 
@@ -42,7 +42,7 @@ TEST(Minimise, FindsTheBottom) {
     Bowl bowl{some_pose(i)};
     const Minimum found = minimise(std::ref(bowl), some_pose(1000 + i), StepLimits());
     EXPECT_TRUE(found.converged);
-    EXPECT_LT(apart(found.pose, bowl.bottom), 1e-4);
+    EXPECT_LT(pose_difference(found.pose, bowl.bottom), 1e-4);
     EXPECT_EQ(bowl.asked, found.iterations + 1);
   }
 }
@@ -57,7 +57,7 @@ TEST(Minimise, TrustsALastStepWithoutAskingWhereItLed) {
     limits.trust_last_step = true;
     const Minimum trusted = minimise(std::ref(bowl), guess, limits);
     EXPECT_EQ(bowl.asked, looking - 1);
-    EXPECT_LT(apart(trusted.pose, looked.pose), 1e-15);
+    EXPECT_LT(pose_difference(trusted.pose, looked.pose), 1e-15);
     EXPECT_TRUE(trusted.converged);
   }
 }

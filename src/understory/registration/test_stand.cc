@@ -1,9 +1,11 @@
 #include "understory/registration/test_stand.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
@@ -154,6 +156,28 @@ Points scan_stand(const Stand& stand, const Pose& world_from_sensor, const Patte
   for (const Points& part : parts)
     points.insert(points.end(), part.begin(), part.end());
   return points;
+}
+
+Pattern small_os0() {
+  Pattern pattern = os0_128();
+  pattern.rings = 64;
+  pattern.columns = 512;
+  return pattern;
+}
+
+Points thin(const Points& points, float cube_m) {
+  std::set<std::array<int, 3>> seen;
+  Points kept;
+  for (const Eigen::Vector3f& p : points) {
+    const auto cube = [&](float v) { return static_cast<int>(std::floor(v / cube_m)); };
+    if (seen.insert({cube(p.x()), cube(p.y()), cube(p.z())}).second) kept.push_back(p);
+  }
+  return kept;
+}
+
+Pose upright(double x, double y, double z, double yaw) {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())),
+          Eigen::Vector3d(x, y, z)};
 }
 
 }  // namespace understory::testing

@@ -38,6 +38,7 @@ struct Pattern {
 };
 [[nodiscard]] Pattern vlp16();
 [[nodiscard]] Pattern os0_128();
+[[nodiscard]] Pattern small_os0();  // of it 64 rings and 512 columns
 
 struct StandOptions {
   double half_width_m = 40.0;
@@ -51,5 +52,11 @@ struct StandOptions {
 // Points in the frame of the sensor, ring by ring within a column.
 [[nodiscard]] Points scan_stand(const Stand& stand, const Pose& world_from_sensor,
                                 const Pattern& pattern, std::uint64_t seed);
+
+// The first point in each cube of such edges, in the points' own order.
+[[nodiscard]] Points thin(const Points& points, float cube_m);
+
+// A pose with its z axis upright: m and rad.
+[[nodiscard]] Pose upright(double x, double y, double z, double yaw = 0.0);
 
 }  // namespace understory::testing

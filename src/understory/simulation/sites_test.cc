@@ -64,7 +64,7 @@ const Figures kFigures[] = {
     {"lohja2", 130.0, 150.0, 0.05},      {"lake", 620.0, 800.0, 0.03},
     {"forest", 1100.0, 1300.0, 0.03},    {"skidoo", 600.0, 2000.0, 0.03}};
 
-class SiteFigures : public testing::TestWithParam<Figures> {};
+class SiteFigures : public ::testing::TestWithParam<Figures> {};
 
 TEST_P(SiteFigures, DurationAndLengthAreThoseOfThePapers) {
   const Figures& wanted = GetParam();
@@ -88,7 +88,7 @@ TEST_P(SiteFigures, WayStaysInTheStandForAnySeed) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Papers, SiteFigures, testing::ValuesIn(kFigures),
+INSTANTIATE_TEST_SUITE_P(Papers, SiteFigures, ::testing::ValuesIn(kFigures),
                          [](const auto& each) { return each.param.site; });
 
 double cross_section(double diameter) {

@@ -27,8 +27,8 @@ struct Narrow {
 };
 
 template <typename T>
-class StableSort : public testing::Test {};
-using Types = testing::Types<Wide, Narrow>;
+class StableSort : public ::testing::Test {};
+using Types = ::testing::Types<Wide, Narrow>;
 TYPED_TEST_SUITE(StableSort, Types);
 
 // More than 128 KB: malloc then gives memory of which only 16 bytes are sure to be aligned.

@@ -3,14 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "understory/calibration/lidar_imu/walk_test_support.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // What the check says of a walk. `turned`: of the given axes of the IMU against the true ones.
 std::optional<ClockCheckResult> checked(const SimulatedWalk& walk,

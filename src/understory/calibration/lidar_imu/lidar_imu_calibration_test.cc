@@ -7,17 +7,15 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <numbers>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "understory/calibration/lidar_imu/walk_test_support.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 Eigen::Matrix<double, 7, 1> error_of(const LidarImuResult& result, const Pose& truth,
                                      double late_s) {

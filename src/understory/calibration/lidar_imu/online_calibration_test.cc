@@ -3,14 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "understory/calibration/lidar_imu/walk_test_support.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // What is refined over a walk that is mapped with `given` in place of the true place of the IMU.
 OnlineImuCalibration over(const SimulatedWalk& walk, const Pose& given, std::size_t save_at = 0,

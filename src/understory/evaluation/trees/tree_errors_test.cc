@@ -12,7 +12,7 @@
 namespace understory {
 namespace {
 
-std::vector<Tree> stand(std::uint64_t seed, int n, double extent_m) {
+std::vector<Tree> stand_on_slope(std::uint64_t seed, int n, double extent_m) {
   Random random(seed);
   std::vector<Tree> trees;
   for (int i = 0; i < n; ++i) {
@@ -43,7 +43,7 @@ TEST(TreeErrors, MatchesOneToOneNearestFirst) {
 }
 
 TEST(TreeErrors, FiguresAgreeWithWhatWasPutIn) {
-  std::vector<Tree> b = stand(4, 50, 200.0);
+  std::vector<Tree> b = stand_on_slope(4, 50, 200.0);
   std::vector<Tree> a(b.begin(), b.begin() + 40);
   for (std::size_t i = 0; i < a.size(); ++i) {
     a[i].x += i % 2 == 0 ? 0.03 : -0.03;
@@ -69,7 +69,7 @@ TEST(TreeErrors, FiguresAgreeWithWhatWasPutIn) {
 
 TEST(TreeErrors, AlignsWithoutAStartAmongMissingAndFalseTrees) {
   for (std::uint64_t seed = 20; seed < 25; ++seed) {
-    const std::vector<Tree> b = stand(seed, 120, 60.0);
+    const std::vector<Tree> b = stand_on_slope(seed, 120, 60.0);
     Random random(seed, 1);
     std::vector<Tree> seen;
     for (const Tree& tree : b) {
@@ -90,9 +90,9 @@ TEST(TreeErrors, AlignsWithoutAStartAmongMissingAndFalseTrees) {
 }
 
 TEST(TreeErrors, NoAlignmentBetweenStandsThatShareNothing) {
-  EXPECT_FALSE(
-      align_trees({tree_at(0, 0), tree_at(10, 0)}, stand(1, 30, 50.0), Alignment::kYaw, 0.5)
-          .has_value());
+  EXPECT_FALSE(align_trees({tree_at(0, 0), tree_at(10, 0)}, stand_on_slope(1, 30, 50.0),
+                           Alignment::kYaw, 0.5)
+                   .has_value());
   EXPECT_FALSE(align_trees({}, {}, Alignment::kSe3, 0.5).has_value());
 }
 

@@ -8,7 +8,7 @@ namespace understory {
 namespace {
 
 // A grid of trees 2 m apart, 8 to 39 cm thick.
-std::vector<Tree> stand(double unit = 1.0) {
+std::vector<Tree> tree_grid(double unit = 1.0) {
   std::vector<Tree> trees;
   for (int k = 0; k < 40; ++k) {
     Tree tree;
@@ -30,28 +30,29 @@ std::vector<TreePair> each_with_itself() {
 }
 
 TEST(TreeListCheck, DiametersInAnotherUnitAreNamed) {
-  EXPECT_EQ(diameter_complaint(stand()), "");
-  EXPECT_NE(diameter_complaint(stand(100.0)).find("centimetres"), std::string::npos);
-  EXPECT_NE(diameter_complaint(stand(1.0 / 0.0254)).find("inches"), std::string::npos);
-  EXPECT_NE(diameter_complaint(stand(1000.0)).find("millimetres"), std::string::npos);
-  EXPECT_NE(diameter_complaint(stand(0.001)).find("no metres"), std::string::npos);
-  EXPECT_EQ(diameter_complaint(stand(1.0 / 0.3048)), "");  // feet: a stand of veterans
+  EXPECT_EQ(diameter_complaint(tree_grid()), "");
+  EXPECT_NE(diameter_complaint(tree_grid(100.0)).find("centimetres"), std::string::npos);
+  EXPECT_NE(diameter_complaint(tree_grid(1.0 / 0.0254)).find("inches"), std::string::npos);
+  EXPECT_NE(diameter_complaint(tree_grid(1000.0)).find("millimetres"), std::string::npos);
+  EXPECT_NE(diameter_complaint(tree_grid(0.001)).find("no metres"), std::string::npos);
+  EXPECT_EQ(diameter_complaint(tree_grid(1.0 / 0.3048)), "");  // feet: a stand of veterans
   EXPECT_EQ(diameter_complaint(std::vector<Tree>(40)), "");
   EXPECT_EQ(diameter_complaint(std::vector<Tree>()), "");
 }
 
 TEST(TreeListCheck, PairsTellFeetAndRadii) {
   const std::vector<TreePair> pairs = each_with_itself();
-  EXPECT_EQ(diameter_complaint(stand(), stand(), pairs), "");
-  EXPECT_EQ(diameter_complaint(stand(), stand(1.4), pairs), "");  // as maps of two methods
-  EXPECT_NE(diameter_complaint(stand(), stand(1.0 / 0.3048), pairs).find("3.28 times"),
+  EXPECT_EQ(diameter_complaint(tree_grid(), tree_grid(), pairs), "");
+  EXPECT_EQ(diameter_complaint(tree_grid(), tree_grid(1.4), pairs), "");  // as maps of two methods
+  EXPECT_NE(diameter_complaint(tree_grid(), tree_grid(1.0 / 0.3048), pairs).find("3.28 times"),
             std::string::npos);
-  EXPECT_NE(diameter_complaint(stand(), stand(0.5), pairs).find("radii"), std::string::npos);
-  EXPECT_EQ(diameter_complaint(stand(), stand(100.0), {}), "");
+  EXPECT_NE(diameter_complaint(tree_grid(), tree_grid(0.5), pairs).find("radii"),
+            std::string::npos);
+  EXPECT_EQ(diameter_complaint(tree_grid(), tree_grid(100.0), {}), "");
 }
 
 TEST(TreeListCheck, TreesThatStandTwiceAreCounted) {
-  std::vector<Tree> trees = stand();
+  std::vector<Tree> trees = tree_grid();
   EXPECT_EQ(doubled_rows(trees), 0U);
   for (int k = 0; k < 10; ++k) {
     trees.push_back(trees[static_cast<std::size_t>(k)]);
@@ -66,15 +67,15 @@ TEST(TreeListCheck, TreesThatStandTwiceAreCounted) {
 }
 
 TEST(TreeListCheck, ACopyIsKnownInAnyOrderAndWithMoreRows) {
-  std::vector<Tree> other = stand();
-  EXPECT_TRUE(are_copies(stand(), other));
+  std::vector<Tree> other = tree_grid();
+  EXPECT_TRUE(are_copies(tree_grid(), other));
   std::swap(other.front(), other.back());
   other.insert(other.end(), other.begin(), other.begin() + 10);
-  EXPECT_TRUE(are_copies(stand(), other));
-  EXPECT_TRUE(are_copies(other, stand()));
+  EXPECT_TRUE(are_copies(tree_grid(), other));
+  EXPECT_TRUE(are_copies(other, tree_grid()));
   for (Tree& tree : other)
     tree.x += 0.001;
-  EXPECT_FALSE(are_copies(stand(), other));
+  EXPECT_FALSE(are_copies(tree_grid(), other));
   EXPECT_FALSE(are_copies({}, {}));
 }
 

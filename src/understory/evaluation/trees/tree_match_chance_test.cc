@@ -14,7 +14,7 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // A stand of 900 trees per hectare.
-std::vector<Tree> stand(std::uint64_t seed, int n = 90) {
+std::vector<Tree> dense_stand(std::uint64_t seed, int n = 90) {
   Random random(seed);
   const double side = std::sqrt(n / 0.09);
   std::vector<Tree> trees;
@@ -68,7 +68,7 @@ const Pose kElsewhere(Eigen::Quaterniond(Eigen::AngleAxisd(2.1, Eigen::Vector3d:
 
 TEST(MatchChance, TheSameStandIsBeyondChance) {
   for (const std::uint64_t seed : {1, 2}) {
-    const std::vector<Tree> trees = stand(seed);
+    const std::vector<Tree> trees = dense_stand(seed);
     const std::vector<Tree> again = seen_again(trees, 100 + seed);
     for (const bool searched : {false, true}) {
       const MatchChance chance =
@@ -83,8 +83,8 @@ TEST(MatchChance, TheSameStandIsBeyondChance) {
 
 TEST(MatchChance, TwoStandsAreNot) {
   for (const std::uint64_t seed : {1, 2}) {
-    const std::vector<Tree> trees = stand(seed);
-    const std::vector<Tree> others = seen_again(stand(10 + seed), 100 + seed);
+    const std::vector<Tree> trees = dense_stand(seed);
+    const std::vector<Tree> others = seen_again(dense_stand(10 + seed), 100 + seed);
     for (const bool searched : {false, true}) {
       const MatchChance chance = judge(trees, others, searched);
       EXPECT_GE(chance.pairs, 5U);  // which is what deceives
@@ -115,7 +115,7 @@ TEST(MatchChance, PlantedRowsAreToldByTheirDiameters) {
 }
 
 TEST(MatchChance, FewPairsTellNothing) {
-  const std::vector<Tree> trees = stand(1, 4);
+  const std::vector<Tree> trees = dense_stand(1, 4);
   EXPECT_FALSE(judge(trees, trees, false).beyond_chance);
   EXPECT_FALSE(
       judge(trees,

@@ -53,8 +53,8 @@ std::vector<TreePair> nearest_first(const std::vector<Tree>& a, const std::vecto
   return pairs;
 }
 
-double cost_of(const std::vector<Tree>& a, const std::vector<Tree>& b,
-               const std::vector<TreePair>& pairs, const TreeAssignmentConfig& config) {
+double cost_of_pairs(const std::vector<Tree>& a, const std::vector<Tree>& b,
+                     const std::vector<TreePair>& pairs, const TreeAssignmentConfig& config) {
   double cost = 2.0 * static_cast<double>(a.size() - pairs.size());
   for (const auto& [i, j] : pairs)
     cost += pair_cost(a[i], b[j], config);
@@ -112,7 +112,7 @@ TEST(TreeMatching, CostsNoMoreThanNearestFirstAndLeavesNoNearTrees) {
                                       100'000};  // joins the trees into one large component
     const auto pairs = assign_trees(a, b, config);
     const double saved =
-        cost_of(a, b, match_trees(a, b, 1.5), config) - cost_of(a, b, pairs, config);
+        cost_of_pairs(a, b, match_trees(a, b, 1.5), config) - cost_of_pairs(a, b, pairs, config);
     EXPECT_GE(saved, 0.0);
     less += saved;
     std::vector<bool> free_a(a.size(), true);
@@ -126,7 +126,7 @@ TEST(TreeMatching, CostsNoMoreThanNearestFirstAndLeavesNoNearTrees) {
     std::vector<TreePair> back;
     for (const auto& [j, i] : assign_trees(b, a, config))
       back.emplace_back(i, j);
-    EXPECT_NEAR(cost_of(a, b, back, config), cost_of(a, b, pairs, config), 1e-9);
+    EXPECT_NEAR(cost_of_pairs(a, b, back, config), cost_of_pairs(a, b, pairs, config), 1e-9);
   }
   EXPECT_GT(less, 50.0);
 }

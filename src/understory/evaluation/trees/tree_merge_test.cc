@@ -12,7 +12,7 @@
 namespace understory {
 namespace {
 
-std::vector<Tree> stand(std::uint64_t seed, int n) {
+std::vector<Tree> square_stand(std::uint64_t seed, int n) {
   Random random(seed);
   std::vector<Tree> trees;
   while (static_cast<int>(trees.size()) < n) {
@@ -49,7 +49,7 @@ std::vector<Tree> bent(const std::vector<Tree>& trees, std::uint64_t seed, doubl
 
 // The errata to P1 (7): as printed it maps a constant field to zero.
 TEST(TreeMerge, AConstantFieldIsPreservedThoughTreesAreMissing) {
-  const std::vector<Tree> s = stand(1, 200);
+  const std::vector<Tree> s = square_stand(1, 200);
   std::vector<Tree> l;
   for (std::size_t i = 0; i < s.size(); ++i) {
     if (i % 4 == 0) continue;
@@ -64,7 +64,7 @@ TEST(TreeMerge, AConstantFieldIsPreservedThoughTreesAreMissing) {
 }
 
 TEST(TreeMerge, TheFieldOfAPathIsThatOfTheTreesBesideIt) {
-  const std::vector<Tree> s = stand(1, 200);
+  const std::vector<Tree> s = square_stand(1, 200);
   const DeformationField field = deformation_field(s, bent(s, 3, 0.0, 0.0), {});
   std::vector<Eigen::Vector2d> path;  // past every tree, half a metre beside it
   for (const Tree& tree : s)
@@ -84,7 +84,7 @@ TEST(TreeMerge, TheFieldOfAPathIsThatOfTheTreesBesideIt) {
 
 // Against ((I + D^-1 A) / 2)^(2k) as matrices.
 TEST(TreeMerge, SmoothsAsTheMatrixOfTheEquationDoes) {
-  const std::vector<Tree> s = stand(2, 60);
+  const std::vector<Tree> s = square_stand(2, 60);
   const std::vector<Tree> l = bent(s, 3, 0.05, 0.0);
   TreeMergeConfig config;
   config.smoothing = 3;
@@ -113,7 +113,7 @@ TEST(TreeMerge, SmoothsAsTheMatrixOfTheEquationDoes) {
 }
 
 TEST(TreeMerge, EndsOfTheWeightHoldOneMapWhereItIs) {
-  const std::vector<Tree> s = stand(4, 150);
+  const std::vector<Tree> s = square_stand(4, 150);
   const std::vector<Tree> l = bent(s, 5, 0.03, 0.2);
   const MergedTrees at_s = merge_trees(s, l, 0.0, {});
   EXPECT_GT(at_s.joined, 110U);

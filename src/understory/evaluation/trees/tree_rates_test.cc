@@ -8,7 +8,7 @@
 namespace understory {
 namespace {
 
-std::vector<Tree> stand() {
+std::vector<Tree> long_stand() {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> along(-10.0, 210.0);
   std::uniform_real_distribution<double> across(-40.0, 60.0);
@@ -37,7 +37,7 @@ Trajectory road(double y) {
 }
 
 TEST(TreeRates, DetectionFallsWithTheDistance) {
-  const std::vector<Tree> truth = stand();
+  const std::vector<Tree> truth = long_stand();
   std::vector<Tree> found;
   for (std::size_t k = 0; k < truth.size(); ++k) {
     const double away = std::abs(truth[k].y);
@@ -64,7 +64,7 @@ TEST(TreeRates, DetectionFallsWithTheDistance) {
 }
 
 TEST(TreeRates, FelledTreesAreNeitherMissedNorFalse) {
-  std::vector<Tree> truth = stand();
+  std::vector<Tree> truth = long_stand();
   const std::vector<Tree> found = truth;
   for (std::size_t k = 0; k < truth.size(); k += 3)
     truth[k].felled = true;
@@ -89,7 +89,7 @@ TEST(TreeRates, TheLastRingEndsAtTheReach) {
 }
 
 TEST(TreeRates, ABentMapIsConsistentInParts) {
-  const std::vector<Tree> a = stand();
+  const std::vector<Tree> a = long_stand();
   std::vector<Tree> b = a;
   // A heading that drifts by a degree over 200 m.
   for (Tree& tree : b)
@@ -106,7 +106,7 @@ TEST(TreeRates, ABentMapIsConsistentInParts) {
 }
 
 TEST(TreeRates, OnlyWhatBothCanSeeCounts) {
-  const std::vector<Tree> all = stand();
+  const std::vector<Tree> all = long_stand();
   std::vector<Tree> near_a;
   std::vector<Tree> near_b;
   for (const Tree& tree : all) {

@@ -9,7 +9,7 @@ namespace understory {
 namespace {
 
 constexpr int kSide = 40;
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoHeight = std::numeric_limits<float>::quiet_NaN();
 
 // z over column and row.
 template <typename Height>
@@ -43,8 +43,9 @@ TEST(Cloth, DoesNotFollowACrownUpwards) {
 }
 
 TEST(Cloth, SpansPlacesWithoutPoints) {
-  const auto floor = floor_of(
-      [](int column, int row) { return std::hypot(column - 20, row - 20) < 4.0 ? kNan : 3.0F; });
+  const auto floor = floor_of([](int column, int row) {
+    return std::hypot(column - 20, row - 20) < 4.0 ? kNoHeight : 3.0F;
+  });
   const std::vector<float> cloth = settle_cloth(floor, kSide, kSide, {});
   EXPECT_NEAR(cloth[at(20, 20)], 3.0F, 0.5F);
 }
@@ -58,7 +59,7 @@ TEST(Cloth, AStifferOneBulgesLess) {
 }
 
 TEST(Cloth, WithoutAnyPointItStaysUnknown) {
-  const std::vector<float> floor(16, kNan);
+  const std::vector<float> floor(16, kNoHeight);
   for (const float z : settle_cloth(floor, 4, 4, {}))
     EXPECT_TRUE(std::isnan(z));
   EXPECT_TRUE(settle_cloth({}, 0, 0, {}).empty());

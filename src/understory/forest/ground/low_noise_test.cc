@@ -4,18 +4,14 @@
 
 #include <vector>
 
+#include "understory/forest/test_plot.h"
+
 namespace understory {
 namespace {
 
-using Points = std::vector<Eigen::Vector3d>;
-
-PointBlocks blocks(const Points& points) {
-  return [&points](const PointVisitor& visit) { visit(points); };
-}
-
 // Ground of a slope, 20 x 20 m, with 16 points on each square metre.
-Points slope() {
-  Points points;
+Cloud sloping_cloud() {
+  Cloud points;
   for (int j = 0; j < 80; ++j) {
     for (int i = 0; i < 80; ++i)
       points.emplace_back(0.25 * i, 0.25 * j, 300.0 + 0.05 * i);
@@ -24,17 +20,17 @@ Points slope() {
 }
 
 TEST(LowNoise, GhostsFarBelowTheGroundAreNoise) {
-  Points points = slope();
+  Cloud points = sloping_cloud();
   for (int i = 0; i < 10; ++i)
     points.emplace_back(5.0 + 0.01 * i, 5.0, 260.0 + 3.7 * i);  // spread over the depth
-  const LowNoise noise(blocks(points));
+  const LowNoise noise(blocks_of(points));
   for (std::size_t i = points.size() - 10; i < points.size(); ++i)
     EXPECT_TRUE(noise.holds(points[i])) << points[i].z();
 }
 
 TEST(LowNoise, NothingOfTheGroundIsNoise) {
-  const Points points = slope();
-  const LowNoise noise(blocks(points));
+  const Cloud points = sloping_cloud();
+  const LowNoise noise(blocks_of(points));
   for (const Eigen::Vector3d& point : points)
     ASSERT_FALSE(noise.holds(point)) << point.transpose();
   EXPECT_FALSE(noise.holds({5.0, 5.0, 320.0})) << "nor what stands on it";
@@ -42,16 +38,16 @@ TEST(LowNoise, NothingOfTheGroundIsNoise) {
 }
 
 TEST(LowNoise, WhereNothingIsKnownNothingIsNoise) {
-  const Points points = slope();
-  const LowNoise noise(blocks(points));
+  const Cloud points = sloping_cloud();
+  const LowNoise noise(blocks_of(points));
   EXPECT_FALSE(noise.holds({500.0, 500.0, 0.0}));
 }
 
 // Heights are counted in spans of 32 m. Two points on each side of an end make one layer.
 TEST(LowNoise, ALayerGoesOnFromSpanToSpan) {
-  const Points points = {
+  const Cloud points = {
       {0.5, 0.5, 0.0}, {0.5, 0.5, 31.8}, {0.5, 1.5, 31.9}, {1.5, 0.5, 32.1}, {1.5, 1.5, 32.2}};
-  const LowNoise noise(blocks(points));
+  const LowNoise noise(blocks_of(points));
   EXPECT_TRUE(noise.holds(points[0])) << "alone, far under the layer";
   for (std::size_t i = 1; i < points.size(); ++i)
     EXPECT_FALSE(noise.holds(points[i])) << points[i].z();

@@ -9,7 +9,7 @@ namespace understory {
 namespace {
 
 // A slope that falls to the east, 60 x 40 cells of half a metre.
-Raster slope() {
+Raster sloping_raster() {
   Raster raster;
   raster.cell_m = 0.5;
   raster.columns = 60;
@@ -22,10 +22,10 @@ Raster slope() {
   return raster;
 }
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoGround = std::numeric_limits<float>::quiet_NaN();
 
 TEST(SeenGround, WhatWasSeenAsAWholeStays) {
-  Raster raster = slope();
+  Raster raster = sloping_raster();
   raster.values[raster.index(30, 20)] += 0.4F;  // a stone
   const Raster before = raster;
   drop_unseen_ground(raster);
@@ -34,12 +34,12 @@ TEST(SeenGround, WhatWasSeenAsAWholeStays) {
 
 // East of column 35 every third cell has a stem's lowest point, ever higher above the slope.
 TEST(SeenGround, StemsBeyondItDoNotCarryTheTerrain) {
-  Raster raster = slope();
+  Raster raster = sloping_raster();
   for (int row = 0; row < 40; ++row) {
     for (int column = 35; column < 60; ++column) {
       float& z = raster.values[raster.index(column, row)];
       z = (row + column) % 3 == 0 && column > 37 ? z + 0.1F * static_cast<float>(column - 33)
-                                                 : kNan;
+                                                 : kNoGround;
     }
   }
   drop_unseen_ground(raster);
@@ -53,10 +53,10 @@ TEST(SeenGround, StemsBeyondItDoNotCarryTheTerrain) {
 
 // The same cells on the slope itself are ground that few beams reached.
 TEST(SeenGround, ThinGroundBeyondItStays) {
-  Raster raster = slope();
+  Raster raster = sloping_raster();
   for (int row = 0; row < 40; ++row) {
     for (int column = 35; column < 60; ++column) {
-      if ((row + column) % 3 != 0) raster.values[raster.index(column, row)] = kNan;
+      if ((row + column) % 3 != 0) raster.values[raster.index(column, row)] = kNoGround;
     }
   }
   const Raster before = raster;
@@ -66,8 +66,8 @@ TEST(SeenGround, ThinGroundBeyondItStays) {
 }
 
 TEST(SeenGround, NoGroundAtAllIsNoError) {
-  Raster raster = slope();
-  raster.values.assign(raster.values.size(), kNan);
+  Raster raster = sloping_raster();
+  raster.values.assign(raster.values.size(), kNoGround);
   drop_unseen_ground(raster);
   EXPECT_TRUE(std::isnan(raster.values[0]));
 }

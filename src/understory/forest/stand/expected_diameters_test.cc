@@ -8,15 +8,13 @@
 
 #include "understory/forest/stand/height_curve.h"
 #include "understory/forest/stand/stand_trees.h"
+#include "understory/forest/stand/test_heights.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
 
-double true_height(double dbh_m) {
-  const double d = 100.0 * dbh_m;
-  return 1.3 + d * d / std::pow(1.2 + 0.19 * d, 2);
-}
+using test::true_height;
 
 // 60 sure stems whose tops were not seen, and 200 far ones with height, whose diameters are 4 cm
 // off.

@@ -7,28 +7,25 @@
 #include <cstdint>
 #include <vector>
 
+#include "understory/forest/stand/test_heights.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
 
-Tree tree_of(double dbh_m, double height_m) {
+using test::true_height;
+
+Tree measured_tree(double dbh_m, double height_m) {
   Tree tree;
   tree.dbh_m = dbh_m;
   tree.height_m = height_m;
   return tree;
 }
 
-// In Naeslund's own units: 1.3 + d^2 / (1.2 + 0.19 d)^2, d in cm.
-double true_height(double dbh_m) {
-  const double d = 100.0 * dbh_m;
-  return 1.3 + d * d / std::pow(1.2 + 0.19 * d, 2);
-}
-
 TEST(HeightCurve, FindsTheCurveThatHeightsLieOn) {
-  std::vector<Tree> trees = {tree_of(0.2, NAN), tree_of(NAN, 12.0)};
+  std::vector<Tree> trees = {measured_tree(0.2, NAN), measured_tree(NAN, 12.0)};
   for (int i = 0; i < 12; ++i)
-    trees.push_back(tree_of(0.06 + 0.03 * i, true_height(0.06 + 0.03 * i)));
+    trees.push_back(measured_tree(0.06 + 0.03 * i, true_height(0.06 + 0.03 * i)));
   const auto curve = fit_height_curve(trees);
   ASSERT_TRUE(curve);
   EXPECT_EQ(curve->trees, 12U);
@@ -41,7 +38,7 @@ TEST(HeightCurve, ItsDeviationIsThatOfTheTrees) {
   std::vector<Tree> trees;
   for (int i = 0; i < 400; ++i) {
     const double dbh = random.uniform(0.1, 0.4);
-    trees.push_back(tree_of(dbh, true_height(dbh) + random.normal(0.0, 1.1)));
+    trees.push_back(measured_tree(dbh, true_height(dbh) + random.normal(0.0, 1.1)));
   }
   const auto curve = fit_height_curve(trees);
   ASSERT_TRUE(curve);
@@ -55,7 +52,8 @@ TEST(HeightCurve, SingleHeightsThatAreFarOffDoNotMoveIt) {
   for (int i = 0; i < 60; ++i) {
     const double dbh = random.uniform(0.1, 0.4);
     const double cut = i % 6 == 0 ? random.uniform(6.0, 10.0) : 0.0;  // tops that were not seen
-    trees.push_back(tree_of(dbh, std::max(2.0, true_height(dbh) - cut + random.normal(0.0, 0.5))));
+    trees.push_back(
+        measured_tree(dbh, std::max(2.0, true_height(dbh) - cut + random.normal(0.0, 0.5))));
   }
   const auto curve = fit_height_curve(trees);
   ASSERT_TRUE(curve);
@@ -70,10 +68,10 @@ TEST(HeightCurve, AHeightFarAboveItHasNoSay) {
   std::vector<Tree> trees;
   for (int i = 0; i < 40; ++i) {
     const double dbh = random.uniform(0.1, 0.4);
-    trees.push_back(tree_of(dbh, true_height(dbh) + random.normal(0.0, 0.5)));
+    trees.push_back(measured_tree(dbh, true_height(dbh) + random.normal(0.0, 0.5)));
   }
   const auto without = fit_height_curve(trees);
-  trees.push_back(tree_of(0.12, true_height(0.12) + 9.0));
+  trees.push_back(measured_tree(0.12, true_height(0.12) + 9.0));
   const auto curve = fit_height_curve(trees);
   ASSERT_TRUE(without && curve);
   EXPECT_NEAR(curve->at(0.12), without->at(0.12), 0.02);
@@ -89,10 +87,10 @@ TEST(HeightCurve, LowerBoundsCountWhereTheyEndNearTheCurve) {
     const double dbh = random.uniform(0.1, 0.4);
     const double height = true_height(dbh) + random.normal(0.0, 1.0);
     const bool hidden = random.uniform(0.0, 1.0) < 0.4;
-    trees.push_back(tree_of(dbh, hidden ? height * random.uniform(0.2, 1.0) : height));
+    trees.push_back(measured_tree(dbh, hidden ? height * random.uniform(0.2, 1.0) : height));
     const bool flagged = random.uniform(0.0, 1.0) < (hidden ? 0.8 : 0.5);
     trees.back().height_is_lower_bound = flagged ? 1.0 : 0.0;
-    if (!hidden) right.push_back(tree_of(dbh, height));
+    if (!hidden) right.push_back(measured_tree(dbh, height));
   }
   const auto curve = fit_height_curve(trees);
   ASSERT_TRUE(curve);
@@ -110,7 +108,7 @@ TEST(HeightCurve, ItsOwnDeviationIsThatOfManyCurves) {
     std::vector<Tree> trees;
     for (int i = 0; i < 30; ++i) {
       const double dbh = random.uniform(0.1, 0.3);
-      trees.push_back(tree_of(dbh, true_height(dbh) + random.normal(0.0, 1.0)));
+      trees.push_back(measured_tree(dbh, true_height(dbh) + random.normal(0.0, 1.0)));
     }
     const auto curve = fit_height_curve(trees);
     ASSERT_TRUE(curve);
@@ -126,7 +124,8 @@ TEST(HeightCurve, ItsOwnDeviationIsThatOfManyCurves) {
 TEST(HeightCurve, TheHeightOfALowerBoundIsTheMeanOfBothKinds) {
   std::vector<Tree> trees;
   for (int i = 0; i < 30; ++i)
-    trees.push_back(tree_of(0.1 + 0.01 * i, true_height(0.1 + 0.01 * i) + (i % 2 == 0 ? 1 : -1)));
+    trees.push_back(
+        measured_tree(0.1 + 0.01 * i, true_height(0.1 + 0.01 * i) + (i % 2 == 0 ? 1 : -1)));
   const auto curve = fit_height_curve(trees);
   ASSERT_TRUE(curve);
   const double mean = curve->at(0.2);
@@ -165,7 +164,7 @@ TEST(HeightCurve, LiesAtTheTallTreesWhereMostTopsAreHidden) {
     const double dbh = random.uniform(0.1, 0.4);
     const double height = true_height(dbh) + random.normal(0.0, 0.8);
     const bool hidden = random.uniform(0.0, 1.0) < 0.65;
-    trees.push_back(tree_of(dbh, hidden ? height * random.uniform(0.4, 1.0) : height));
+    trees.push_back(measured_tree(dbh, hidden ? height * random.uniform(0.4, 1.0) : height));
   }
   const auto curve = fit_height_curve(trees);
   ASSERT_TRUE(curve);
@@ -178,10 +177,10 @@ TEST(HeightCurve, LiesAtTheTallTreesWhereMostTopsAreHidden) {
 }
 
 TEST(HeightCurve, IsNotGuessedFromFewOrEqualTrees) {
-  std::vector<Tree> few(7, tree_of(0.2, 15.0));
-  few.back() = tree_of(0.4, 22.0);
+  std::vector<Tree> few(7, measured_tree(0.2, 15.0));
+  few.back() = measured_tree(0.4, 22.0);
   EXPECT_FALSE(fit_height_curve(few));
-  EXPECT_FALSE(fit_height_curve(std::vector<Tree>(20, tree_of(0.2, 15.0))));
+  EXPECT_FALSE(fit_height_curve(std::vector<Tree>(20, measured_tree(0.2, 15.0))));
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ std::vector<SlicePoint> seen_from_one_side(double radius, double noise, int coun
   return points;
 }
 
-StemFit start_of(double radius, double x, double y) {
+StemFit start_at(double radius, double x, double y) {
   StemFit start;
   start.centre = {x, y};
   start.slope = {0.02, 0.0};
@@ -43,7 +43,7 @@ TEST(NoisyCylinder, ScatterAsLargeAsAThirdOfTheRadiusDoesNotMakeTheStemThicker) 
   for (int i = 0; i < kStems; ++i) {
     const std::vector<SlicePoint> points = seen_from_one_side(0.075, 0.025, 400, random);
     // Distances alone lead there: a circle that is too large and too far back.
-    const NoisyCylinder fit = fit_noisy_cylinder(points, start_of(0.1, 0.0, 0.02), {});
+    const NoisyCylinder fit = fit_noisy_cylinder(points, start_at(0.1, 0.0, 0.02), {});
     ASSERT_TRUE(fit.converged);
     EXPECT_NEAR(fit.radius_m, 0.075, 0.03);
     EXPECT_NEAR(fit.scatter_m, 0.025, 0.006);
@@ -61,7 +61,7 @@ TEST(NoisyCylinder, LittleScatterLeavesPlaceAndRadiusToMillimetres) {
   constexpr int kStems = 20;
   for (int i = 0; i < kStems; ++i) {
     const std::vector<SlicePoint> points = seen_from_one_side(0.2, 0.01, 500, random);
-    const NoisyCylinder fit = fit_noisy_cylinder(points, start_of(0.18, 0.02, -0.02), {});
+    const NoisyCylinder fit = fit_noisy_cylinder(points, start_at(0.18, 0.02, -0.02), {});
     ASSERT_TRUE(fit.converged);
     EXPECT_NEAR(fit.slope.x(), 0.02, 0.005);
     EXPECT_NEAR(fit.taper, -0.008, 0.006);
@@ -87,7 +87,7 @@ TEST(NoisyCylinder, ALeaningStemIsMeasuredAcrossItsAxis) {
     points.push_back(
         {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z() + 1.3), 1});
   }
-  StemFit start = start_of(0.14, 0.0, 0.01);
+  StemFit start = start_at(0.14, 0.0, 0.01);
   start.slope = {0.57, 0.0};
   NoisyCylinderConfig config;
   config.usual_taper = 0.0;
@@ -98,7 +98,7 @@ TEST(NoisyCylinder, ALeaningStemIsMeasuredAcrossItsAxis) {
 
 TEST(NoisyCylinder, TooFewPointsDoNotConverge) {
   Random random(4);
-  EXPECT_FALSE(fit_noisy_cylinder(seen_from_one_side(0.1, 0.01, 5, random), start_of(0.1, 0, 0), {})
+  EXPECT_FALSE(fit_noisy_cylinder(seen_from_one_side(0.1, 0.01, 5, random), start_at(0.1, 0, 0), {})
                    .converged);
 }
 

@@ -14,7 +14,7 @@ namespace {
 using Eigen::Vector3d;
 
 // Sixty stems of 15 m on flat ground of 40 x 40 m, then all of it turned.
-std::vector<Vector3d> stand(const Eigen::Quaterniond& turn) {
+std::vector<Vector3d> turned_stand(const Eigen::Quaterniond& turn) {
   Random random(1);
   std::vector<Vector3d> points;
   for (int i = 0; i < 6400; ++i)
@@ -37,7 +37,7 @@ double angle_deg(const Vector3d& a, const Vector3d& b) {
 }
 
 TEST(StandingDirection, UprightStemsStandAlongZ) {
-  const auto found = standing_direction(stand(Eigen::Quaterniond::Identity()), {0.0, 0.0});
+  const auto found = standing_direction(turned_stand(Eigen::Quaterniond::Identity()), {0.0, 0.0});
   ASSERT_TRUE(found.has_value());
   EXPECT_LT(angle_deg(found->axis, Vector3d::UnitZ()), 3.0);
   EXPECT_GT(found->gain_of_z, 2.0);
@@ -47,14 +47,14 @@ TEST(StandingDirection, UprightStemsStandAlongZ) {
 TEST(StandingDirection, ATiltedStandTellsWhereUpIs) {
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(30.0 * M_PI / 180.0, Vector3d::UnitX()));
   const Vector3d up = turn * Vector3d::UnitZ();
-  const auto found = standing_direction(stand(turn), -up.head<2>() / up.z());
+  const auto found = standing_direction(turned_stand(turn), -up.head<2>() / up.z());
   ASSERT_TRUE(found.has_value());
   EXPECT_LT(angle_deg(found->axis, up), 3.0);
   EXPECT_GT(found->gain, 1.5 * found->gain_of_z);
 }
 
 TEST(StandingDirection, TooFewPointsTellNothing) {
-  std::vector<Vector3d> points = stand(Eigen::Quaterniond::Identity());
+  std::vector<Vector3d> points = turned_stand(Eigen::Quaterniond::Identity());
   points.resize(6500);  // the ground and a part of one stem
   EXPECT_FALSE(standing_direction(points, {0.0, 0.0}).has_value());
   EXPECT_FALSE(standing_direction({}, {0.0, 0.0}).has_value());

@@ -31,7 +31,7 @@ std::vector<SlicePoint> stem_points(double radius, double slope, double arc_deg,
 }
 
 // A start as the rings give it: some centimetres off.
-StemFit start_of(double radius, double slope) {
+StemFit start_of_rings(double radius, double slope) {
   StemFit start;
   start.centre = {1.02, 1.985};
   start.slope = {slope + 0.01, -0.01};
@@ -45,7 +45,7 @@ StemFit start_of(double radius, double slope) {
 TEST(StemFit, PlaceLeanAndRadiusOfALeaningStem) {
   Random random(1);
   const auto points = stem_points(0.18, 0.15, 360.0, 800, 0.004, random);
-  const StemFitResult fit = fit_stem(points, start_of(0.18, 0.15), {});
+  const StemFitResult fit = fit_stem(points, start_of_rings(0.18, 0.15), {});
   ASSERT_TRUE(fit.converged);
   EXPECT_LT((fit.stem.centre - Eigen::Vector2d(1.0, 2.0)).norm(), 0.003);
   EXPECT_NEAR(fit.stem.slope.x(), 0.15, 0.005);
@@ -62,7 +62,7 @@ TEST(StemFit, ItsStandardDeviationsHold) {
   constexpr int kStems = 60;
   for (int i = 0; i < kStems; ++i) {
     const auto points = stem_points(0.18, 0.0, 160.0, 300, 0.006, random);
-    const StemFitResult fit = fit_stem(points, start_of(0.18, 0.0), {});
+    const StemFitResult fit = fit_stem(points, start_of_rings(0.18, 0.0), {});
     ASSERT_TRUE(fit.converged);
     const double sd = std::sqrt(fit.stem.covariance(2, 2));
     EXPECT_GT(sd, 0.0);
@@ -74,7 +74,7 @@ TEST(StemFit, ItsStandardDeviationsHold) {
 TEST(StemFit, TheEvidenceTellsAStemFromFoliage) {
   Random random(3);
   const StemFitResult stem =
-      fit_stem(stem_points(0.18, 0.0, 360.0, 800, 0.004, random), start_of(0.18, 0.0), {});
+      fit_stem(stem_points(0.18, 0.0, 360.0, 800, 0.004, random), start_of_rings(0.18, 0.0), {});
   EXPECT_EQ(stem.evidence.inside, 0);
   EXPECT_GE(stem.evidence.on, 760);
   EXPECT_NEAR(stem.evidence.returns, 2 * stem.evidence.on, 4);
@@ -86,7 +86,7 @@ TEST(StemFit, TheEvidenceTellsAStemFromFoliage) {
     foliage.push_back({static_cast<float>(random.uniform(0.6, 1.4)),
                        static_cast<float>(random.uniform(1.6, 2.4)),
                        static_cast<float>(random.uniform(0.5, 3.5)), 1});
-  const StemFitResult bush = fit_stem(foliage, start_of(0.18, 0.0), {});
+  const StemFitResult bush = fit_stem(foliage, start_of_rings(0.18, 0.0), {});
   EXPECT_GT(bush.evidence.inside, 100);
 }
 
@@ -96,7 +96,7 @@ TEST(StemFit, RefiningKeepsTheRadiusOfPointsThatScatter) {
   constexpr int kStems = 10;
   for (int i = 0; i < kStems; ++i) {
     const auto points = stem_points(0.1, 0.0, 360.0, 600, 0.02, random);
-    const StemFitResult fit = fit_stem(points, start_of(0.1, 0.0), {});
+    const StemFitResult fit = fit_stem(points, start_of_rings(0.1, 0.0), {});
     ASSERT_TRUE(fit.converged);
     const StemFitResult better = refine_stem(points, fit, {});
     ASSERT_TRUE(better.converged);
@@ -106,7 +106,7 @@ TEST(StemFit, RefiningKeepsTheRadiusOfPointsThatScatter) {
 }
 
 TEST(StemFit, NoPointsAreNoStem) {
-  EXPECT_FALSE(fit_stem({}, start_of(0.18, 0.0), {}).converged);
+  EXPECT_FALSE(fit_stem({}, start_of_rings(0.18, 0.0), {}).converged);
 }
 
 }  // namespace

@@ -62,7 +62,7 @@ class SortedCloud : public TiledCloud {
 
 // A strip of 100 m by 12 m on a slope, longer than a tile and its surroundings. Stems stand at the
 // borders of 20 and 25 m and elsewhere, with a hedge and undergrowth.
-const Cloud& stand() {
+const Cloud& strip_of_stems() {
   static const Cloud cloud = [] {
     TestPlot plot(11);
     plot.slope_x = 0.1;
@@ -139,9 +139,9 @@ void expect_same(const InventoryResult& a, const InventoryResult& b) {
 
 // The tree of each point, in the order of the cloud.
 std::vector<std::uint32_t> labels_of(const InventoryResult& result, const TiledCloud* tiled) {
-  std::vector<std::uint32_t> labels(stand().size(), 0);
+  std::vector<std::uint32_t> labels(strip_of_stems().size(), 0);
   const auto label = [&](const TreeOwners& owners, std::size_t i) {
-    const Eigen::Vector3d& point = stand()[i];
+    const Eigen::Vector3d& point = strip_of_stems()[i];
     labels[i] = tree_at(result, owners, point, result.ground.height_above(point));
   };
   const std::size_t tiles = tiled == nullptr ? 1 : tiled->tiles().size();
@@ -149,14 +149,15 @@ std::vector<std::uint32_t> labels_of(const InventoryResult& result, const TiledC
     const TreeOwners owners =
         result.owner_tiles ? result.owner_tiles->owners(tile) : *result.owners;
     for (std::size_t i = 0; i < labels.size(); ++i) {
-      if (!result.owner_tiles || result.owner_tiles->holds(tile, stand()[i])) label(owners, i);
+      if (!result.owner_tiles || result.owner_tiles->holds(tile, strip_of_stems()[i]))
+        label(owners, i);
     }
   }
   return labels;
 }
 
 TEST(TiledInventory, TheSameTreesWhateverTheTilesAre) {
-  const InventoryResult whole = take_inventory(blocks_of(stand()), {});
+  const InventoryResult whole = take_inventory(blocks_of(strip_of_stems()), {});
   EXPECT_GE(whole.trees.size(), 25U);
   const auto hidden = std::count_if(whole.stems.begin(), whole.stems.end(),
                                     [](const StemFit& stem) { return stem.below_sd_m > 0.0; });
@@ -164,8 +165,8 @@ TEST(TiledInventory, TheSameTreesWhateverTheTilesAre) {
   const std::vector<std::uint32_t> labels = labels_of(whole, nullptr);
   bool backwards = false;
   for (const double tile_m : {128.0, 50.0, 25.0, 20.3}) {
-    SCOPED_TRACE(testing::Message() << tile_m);
-    const SortedCloud tiles(stand(), tile_m, backwards, backwards);
+    SCOPED_TRACE(::testing::Message() << tile_m);
+    const SortedCloud tiles(strip_of_stems(), tile_m, backwards, backwards);
     const InventoryResult tiled = take_inventory(tiles, {});
     expect_same(whole, tiled);
     EXPECT_EQ(labels, labels_of(tiled, &tiles));
@@ -174,7 +175,7 @@ TEST(TiledInventory, TheSameTreesWhateverTheTilesAre) {
 }
 
 TEST(TiledInventory, TheSameBytesForAnyNumberOfThreads) {
-  const SortedCloud tiles(stand(), 50.0, false, true);
+  const SortedCloud tiles(strip_of_stems(), 50.0, false, true);
   InventoryResult one;
   InventoryResult three;
   with_threads(1, [&] { one = take_inventory(tiles, {}); });

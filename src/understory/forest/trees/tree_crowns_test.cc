@@ -15,7 +15,7 @@ void add_disc(TreeOwners& owners, double radius_m, double height_m) {
   }
 }
 
-OwnerTree tree_of(double height_m) {
+OwnerTree owner_tree(double height_m) {
   OwnerTree tree;
   tree.radius_m = 0.1;
   tree.height_m = height_m;
@@ -33,7 +33,7 @@ TreeCrown crown_with_bush(double bush_m) {
     add_disc(owners, 2.0, height);
   for (double height = 1.6; height < bush_m; height += 0.1)
     add_disc(owners, 1.2, height);
-  const std::vector<OwnerTree> trees = {tree_of(15.0)};
+  const std::vector<OwnerTree> trees = {owner_tree(15.0)};
   owners.find(trees, {});
   return measure_crowns(owners, trees)[0];
 }

@@ -5,7 +5,7 @@
 namespace understory {
 namespace {
 
-Tree tree_of(double dbh_m, double dbh_sd_m, double height_m) {
+Tree tree_with_sd(double dbh_m, double dbh_sd_m, double height_m) {
   Tree tree;
   tree.dbh_m = dbh_m;
   tree.dbh_sd_m = dbh_sd_m;
@@ -17,8 +17,9 @@ constexpr double kUnknown = Tree::kUnknown;
 
 TEST(TreeDoubt, CountsWhatIsNotToBeTrusted) {
   const StandDoubts doubts =
-      doubts_of({tree_of(0.2, 0.059, 12.0), tree_of(0.2, 0.061, 12.0), tree_of(0.3, 0.2, kUnknown),
-                 tree_of(0.3, kUnknown, 9.0), tree_of(kUnknown, kUnknown, 20.0)});
+      doubts_of({tree_with_sd(0.2, 0.059, 12.0), tree_with_sd(0.2, 0.061, 12.0),
+                 tree_with_sd(0.3, 0.2, kUnknown), tree_with_sd(0.3, kUnknown, 9.0),
+                 tree_with_sd(kUnknown, kUnknown, 20.0)});
   EXPECT_EQ(doubts.trees, 5U);
   EXPECT_EQ(doubts.diameters, 4U);
   EXPECT_EQ(doubts.weak_diameters, 2U) << "over 30 % of the diameter";
@@ -27,14 +28,14 @@ TEST(TreeDoubt, CountsWhatIsNotToBeTrusted) {
 }
 
 TEST(TreeDoubt, SortsByDiameterThenArcThenHeight) {
-  const double good = doubt_of(tree_of(0.3, 0.01, 20.0), 350.0);
+  const double good = doubt_of(tree_with_sd(0.3, 0.01, 20.0), 350.0);
   EXPECT_NEAR(good, 0.01 / 0.09, 1e-12);
-  EXPECT_NEAR(doubt_of(tree_of(0.3, 0.01, kUnknown), 350.0) - good, 0.5, 1e-12);
-  EXPECT_NEAR(doubt_of(tree_of(0.3, 0.01, 20.0), 90.0) - good, 0.5, 1e-12);
-  EXPECT_NEAR(doubt_of(tree_of(0.3, 0.01, 20.0), kUnknown), good, 1e-12);
-  const double worst = doubt_of(tree_of(0.1, 5.0, kUnknown), 0.0);
-  EXPECT_GT(worst, doubt_of(tree_of(0.1, 0.05, kUnknown), 60.0));
-  EXPECT_GT(doubt_of(tree_of(kUnknown, kUnknown, 20.0), kUnknown), worst);
+  EXPECT_NEAR(doubt_of(tree_with_sd(0.3, 0.01, kUnknown), 350.0) - good, 0.5, 1e-12);
+  EXPECT_NEAR(doubt_of(tree_with_sd(0.3, 0.01, 20.0), 90.0) - good, 0.5, 1e-12);
+  EXPECT_NEAR(doubt_of(tree_with_sd(0.3, 0.01, 20.0), kUnknown), good, 1e-12);
+  const double worst = doubt_of(tree_with_sd(0.1, 5.0, kUnknown), 0.0);
+  EXPECT_GT(worst, doubt_of(tree_with_sd(0.1, 0.05, kUnknown), 60.0));
+  EXPECT_GT(doubt_of(tree_with_sd(kUnknown, kUnknown, 20.0), kUnknown), worst);
 }
 
 }  // namespace

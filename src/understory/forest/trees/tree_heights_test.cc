@@ -8,7 +8,7 @@
 namespace understory {
 namespace {
 
-StemFit stem_at(double x, double y, double slope = 0.0) {
+StemFit stem_with_slope(double x, double y, double slope = 0.0) {
   StemFit stem;
   stem.centre = {x, y};
   stem.slope = {slope, 0.0};
@@ -22,7 +22,7 @@ void add_crown(TreeColumns& columns, double x, double y, double from_m, double t
 }
 
 TEST(TreeHeights, ATreeEndsAtItsHighestPoint) {
-  const std::vector<StemFit> stems = {stem_at(0.0, 0.0), stem_at(6.0, 0.0)};
+  const std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0), stem_with_slope(6.0, 0.0)};
   TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
   add_crown(columns, 0.0, 0.0, 1.0, 18.35);
   add_crown(columns, 6.0, 0.0, 1.0, 11.0);
@@ -31,7 +31,7 @@ TEST(TreeHeights, ATreeEndsAtItsHighestPoint) {
 }
 
 TEST(TreeHeights, ACrownOfTheNeighbourIsItsOwn) {
-  const std::vector<StemFit> stems = {stem_at(0.0, 0.0), stem_at(2.0, 0.0)};
+  const std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0), stem_with_slope(2.0, 0.0)};
   TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
   add_crown(columns, 0.0, 0.0, 1.0, 9.0);
   add_crown(columns, 1.5, 0.0, 1.0, 20.0);  // nearer to the second stem
@@ -40,7 +40,7 @@ TEST(TreeHeights, ACrownOfTheNeighbourIsItsOwn) {
 }
 
 TEST(TreeHeights, ALeaningTreeIsFollowedToItsCrown) {
-  const std::vector<StemFit> stems = {stem_at(0.0, 0.0, 0.25)};
+  const std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0, 0.25)};
   TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
   for (double height = 1.0; height <= 14.0; height += 0.05)
     columns.add({stem_place_at(stems[0], height).x(), 0.0, height}, height);
@@ -51,7 +51,8 @@ TEST(TreeHeights, ALeaningTreeIsFollowedToItsCrown) {
 }
 
 TEST(TreeHeights, NoTopIsInvented) {
-  const std::vector<StemFit> stems = {stem_at(0.0, 0.0), stem_at(10.0, 0.0), stem_at(20.0, 0.0)};
+  const std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0), stem_with_slope(10.0, 0.0),
+                                      stem_with_slope(20.0, 0.0)};
   TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
   add_crown(columns, 0.0, 0.0, 1.0, 3.5);   // nothing above the slices
   add_crown(columns, 10.0, 0.0, 1.0, 4.4);  // cut off just above them
@@ -64,7 +65,7 @@ TEST(TreeHeights, NoTopIsInvented) {
 
 // A point of the crown a metre down a slope of 27 degrees stands 50 cm higher over its own ground.
 TEST(TreeHeights, OnASlopeTheyCountFromTheFootOfTheTree) {
-  const std::vector<StemFit> stems = {stem_at(0.0, 0.0)};
+  const std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0)};
   TreeColumns columns(stems, {100.0});
   for (double z = 101.0; z <= 112.0 + 1e-9; z += 0.05) {
     columns.add({0.0, 0.0, z}, z - 100.0);
@@ -74,7 +75,7 @@ TEST(TreeHeights, OnASlopeTheyCountFromTheFootOfTheTree) {
 }
 
 TEST(TreeHeights, PointsBelowATopAreCountedToHalfAMetre) {
-  const std::vector<StemFit> stems = {stem_at(0.0, 0.0)};
+  const std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0)};
   TreeColumns columns(stems, {0.0});
   for (const double height : {5.0, 9.48, 9.62, 9.75, 10.04})
     columns.add({0.0, 0.0, height}, height);

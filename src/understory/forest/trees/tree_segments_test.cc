@@ -5,6 +5,8 @@
 #include <cmath>
 #include <set>
 
+#include "understory/forest/test_plot.h"
+
 namespace understory {
 namespace {
 
@@ -31,14 +33,10 @@ std::vector<Tree> trees_of(const std::vector<double>& dbhs) {
   return trees;
 }
 
-PointBlocks blocks(const std::vector<Eigen::Vector3d>& points) {
-  return [&points](const PointVisitor& visit) { visit(points); };
-}
-
 TEST(TreeSegments, PointsAreRelativeToTheFoot) {
   const std::vector<Eigen::Vector3d> points = {
       {5.2, 20.1, 104.0}, {6.4, 20.0, 104.0}, {5.0, 18.9, 101.0}, {5.0, 20.0, 98.0}};
-  const auto segments = collect_segments(blocks(points), ground(), trees_of({0.3}), 5, 1.0);
+  const auto segments = collect_segments(blocks_of(points), ground(), trees_of({0.3}), 5, 1.0);
   ASSERT_EQ(segments.size(), 1U);
   EXPECT_EQ(segments[0].tree_id, 1);
   ASSERT_EQ(segments[0].points.size(), 1U) << "others are beyond the reach or below the ground";
@@ -51,7 +49,7 @@ TEST(TreeSegments, PointsAreThinnedFinerAtBreastHeight) {
     points.emplace_back(5.0 + 0.0005 * i, 20.0, 101.3);  // half a metre at breast height
     points.emplace_back(5.0 + 0.0005 * i, 20.0, 105.0);
   }
-  const auto segments = collect_segments(blocks(points), ground(), trees_of({0.3}), 5, 1.0);
+  const auto segments = collect_segments(blocks_of(points), ground(), trees_of({0.3}), 5, 1.0);
   ASSERT_EQ(segments.size(), 1U);
   int low = 0;
   for (const Eigen::Vector3f& point : segments[0].points)
@@ -62,14 +60,14 @@ TEST(TreeSegments, PointsAreThinnedFinerAtBreastHeight) {
 
 TEST(TreeSegments, TheTreesChosenAreSpreadOverTheDiameters) {
   const std::vector<Tree> trees = trees_of({0.1, 0.5, 0.2, 0.9, 0.3, 0.8, 0.4, 0.7, 0.6, 1.0});
-  const auto segments = collect_segments(blocks({}), ground(), trees, 2, 1.0);
+  const auto segments = collect_segments(blocks_of({}), ground(), trees, 2, 1.0);
   ASSERT_EQ(segments.size(), 2U);
   std::set<double> dbhs;
   for (const TreeSegment& segment : segments)
     dbhs.insert(trees[static_cast<std::size_t>(segment.tree_id) - 1].dbh_m);
   EXPECT_EQ(dbhs, (std::set<double>{0.3, 0.8})) << "one of the thinner and one of the thicker half";
-  EXPECT_EQ(collect_segments(blocks({}), ground(), trees, 50, 1.0).size(), trees.size());
-  EXPECT_TRUE(collect_segments(blocks({}), ground(), {}, 5, 1.0).empty());
+  EXPECT_EQ(collect_segments(blocks_of({}), ground(), trees, 50, 1.0).size(), trees.size());
+  EXPECT_TRUE(collect_segments(blocks_of({}), ground(), {}, 5, 1.0).empty());
 }
 
 }  // namespace

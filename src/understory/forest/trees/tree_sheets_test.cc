@@ -11,7 +11,7 @@
 namespace understory {
 namespace {
 
-StemFit stem_at(double x, double y, double radius_m) {
+StemFit stem_with_radius(double x, double y, double radius_m) {
   StemFit stem;
   stem.centre = {x, y};
   stem.radius_m = radius_m;
@@ -37,9 +37,9 @@ std::vector<SlicePoint> surface_of(const StemFit& stem, int from_deg, int to_deg
 }
 
 TEST(TreeSheets, TellFromWhichSidesAStemWasSeen) {
-  StemFit stem = stem_at(3.0, -4.0, 0.2);
+  StemFit stem = stem_with_radius(3.0, -4.0, 0.2);
   stem.slope = {0.1, -0.05};
-  const std::vector<StemFit> stems = {stem, stem_at(9.0, -4.0, 0.1)};
+  const std::vector<StemFit> stems = {stem, stem_with_radius(9.0, -4.0, 0.1)};
   const SheetCollector collector(stems, surface_of(stem, 31, 120), most_doubtful(stems));
   ASSERT_EQ(collector.seen().size(), 2U);
   for (std::size_t side = 0; side < 36; ++side)
@@ -48,7 +48,7 @@ TEST(TreeSheets, TellFromWhichSidesAStemWasSeen) {
 }
 
 TEST(TreeSheets, ACrossSectionIsARingAlsoOfALeaningStem) {
-  StemFit stem = stem_at(3.0, -4.0, 0.2);
+  StemFit stem = stem_with_radius(3.0, -4.0, 0.2);
   stem.slope = {0.2, 0.1};
   const std::vector<StemFit> stems = {stem};
   SheetCollector collector(stems, surface_of(stem, 0, 360), most_doubtful(stems));
@@ -61,7 +61,7 @@ TEST(TreeSheets, ACrossSectionIsARingAlsoOfALeaningStem) {
 }
 
 TEST(TreeSheets, AreTheSameForAnyOrderOfPoints) {
-  const std::vector<StemFit> stems = {stem_at(0.0, 0.0, 0.1)};
+  const std::vector<StemFit> stems = {stem_with_radius(0.0, 0.0, 0.1)};
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < 6000; ++i) {
     const double angle = 0.7 * i;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "understory/georeference/satellites/gnss_fit.h"
+#include "understory/georeference/satellites/test_mast.h"
 #include "understory/util/angles.h"
 #include "understory/util/random.h"
 
@@ -13,19 +14,19 @@ namespace understory {
 namespace {
 
 using Eigen::Vector3d;
+using test::kArm;
+using test::kPlace;
 
-const GeodeticPlace kPlace{61.2, 25.1, 160.0};
-const Vector3d kArm(0.2, -0.3, 2.0);
 const Pose kEnuFromWorld(Eigen::Quaterniond(Eigen::AngleAxisd(2.2, Vector3d::UnitZ())),
                          Vector3d(4.0, -3.0, 1.0));
 
 // A walk of `n` keyframes, a metre and a second apart, along bends. The map's steps are too long by
 // `scale_error`, and its edges say that they err ten times as much as they do otherwise.
-struct Walk {
+struct MappedWalk {
   std::vector<Pose> truth;  // world frame
   SolvedRun run;
 
-  Walk(int n, double scale_error, std::uint64_t seed) {
+  MappedWalk(int n, double scale_error, std::uint64_t seed) {
     Random random(seed);
     Pose at;
     Pose mapped;
@@ -53,14 +54,15 @@ struct Walk {
   }
 };
 
-struct Receiver {
+struct FixErrors {
   double slow_m = 0.0;
   double fast_m = 0.01;
   double correlation_s = 60.0;
   double stated_m = 1.0;
 };
 
-std::vector<GnssFix> received(const Walk& walk, const Receiver& receiver, std::uint64_t seed) {
+std::vector<GnssFix> fixes_on_walk(const MappedWalk& walk, const FixErrors& receiver,
+                                   std::uint64_t seed) {
   Random random(seed);
   const EastNorthUp frame(kPlace);
   const auto normal = [&] { return Vector3d(random.normal(), random.normal(), random.normal()); };
@@ -90,12 +92,13 @@ PairingConfig with_arm() {
 }
 
 // The rigid fit to the same pairs, as the callers have it.
-Pose first_guess(const Walk& walk, const std::vector<GnssFix>& fixes) {
+Pose first_guess(const MappedWalk& walk, const std::vector<GnssFix>& fixes) {
   return fit_split(pair_by_time(walk.run.trajectory, fixes, with_arm()).pairs, {}).enu_from_world;
 }
 
 // Root mean square of how far keyframes lie off their true places, in the frame of the truth.
-double error_m(const Walk& walk, const std::vector<GnssFix>& fixes, const FusedPath& path) {
+double place_error_m(const MappedWalk& walk, const std::vector<GnssFix>& fixes,
+                     const FusedPath& path) {
   const GeodeticPlace origin{fixes.front().latitude_deg, fixes.front().longitude_deg,
                              fixes.front().height_m};
   const EastNorthUp from(origin);
@@ -108,7 +111,7 @@ double error_m(const Walk& walk, const std::vector<GnssFix>& fixes, const FusedP
   return std::sqrt(squares / static_cast<double>(walk.truth.size()));
 }
 
-FusedPath unbent(const Walk& walk, const Pose& motion) {
+FusedPath unbent(const MappedWalk& walk, const Pose& motion) {
   FusedPath path;
   for (const Pose& pose : walk.run.graph.world_from_keyframe)
     path.enu_from_keyframe.push_back(motion * pose);
@@ -116,21 +119,21 @@ FusedPath unbent(const Walk& walk, const Pose& motion) {
 }
 
 TEST(FusedPath, GoodPositionsTakeAScaleErrorOut) {
-  const Walk walk(300, 0.005, 1);
-  const auto fixes = received(walk, {0.0, 0.01, 60.0, 0.02}, 2);
+  const MappedWalk walk(300, 0.005, 1);
+  const auto fixes = fixes_on_walk(walk, {0.0, 0.01, 60.0, 0.02}, 2);
   const Pose guess = first_guess(walk, fixes);
   const FusedPath fused = fuse_path(walk.run, fixes, guess, with_arm(), {}, {});
   ASSERT_TRUE(fused.found) << fused.reason;
-  EXPECT_GT(error_m(walk, fixes, unbent(walk, guess)), 0.15);
-  EXPECT_LT(error_m(walk, fixes, fused), 0.03);
+  EXPECT_GT(place_error_m(walk, fixes, unbent(walk, guess)), 0.15);
+  EXPECT_LT(place_error_m(walk, fixes, fused), 0.03);
   EXPECT_GT(fused.odometry_scale, 0.25);  // the positions show that the map errs more
   EXPECT_GT(fused.bent_m, 0.1);
 }
 
 // A short way under a bad receiver: the headings tell how it lies, in the graph, too.
 TEST(FusedPath, HeadingsOfASecondAntennaTurnThePath) {
-  const Walk walk(60, 0.0, 1);
-  auto fixes = received(walk, {4.0, 0.3, 60.0, 3.0}, 2);
+  const MappedWalk walk(60, 0.0, 1);
+  auto fixes = fixes_on_walk(walk, {4.0, 0.3, 60.0, 3.0}, 2);
   PairingConfig pairing = with_arm();
   pairing.second_antenna_in_body = kArm + Vector3d(0.0, 1.0, 0.0);
   const auto heading_error_deg = [&](const FusedPath& path) {
@@ -152,21 +155,21 @@ TEST(FusedPath, HeadingsOfASecondAntennaTurnThePath) {
 
 TEST(FusedPath, AReceiverUnderTreesLeavesTheShape) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    const Walk walk(300, 0.0, seed);
-    const auto fixes = received(walk, {3.0, 0.5, 80.0, 0.8}, 100 + seed);
+    const MappedWalk walk(300, 0.0, seed);
+    const auto fixes = fixes_on_walk(walk, {3.0, 0.5, 80.0, 0.8}, 100 + seed);
     const FusedPath fused =
         fuse_path(walk.run, fixes, first_guess(walk, fixes), with_arm(), {}, {});
     ASSERT_TRUE(fused.found) << fused.reason;
     EXPECT_LT(fused.bent_m, 0.02);
     EXPECT_GT(fused.expected_error_m, 0.5);
-    EXPECT_LT(error_m(walk, fixes, fused), 4.0 * fused.expected_error_m);
+    EXPECT_LT(place_error_m(walk, fixes, fused), 4.0 * fused.expected_error_m);
   }
 }
 
 // Half a minute far off: the slow error must not follow it and draw its neighbours along.
 TEST(FusedPath, ARunawayDoesNotDrawThePathAlong) {
-  const Walk walk(300, 0.0, 4);
-  const auto clean = received(walk, {1.0, 0.3, 60.0, 1.0}, 11);
+  const MappedWalk walk(300, 0.0, 4);
+  const auto clean = fixes_on_walk(walk, {1.0, 0.3, 60.0, 1.0}, 11);
   auto away = clean;
   for (std::size_t k = 120; k < 150; ++k)
     away[k].latitude_deg += 40.0 / 111'450.0;
@@ -174,24 +177,24 @@ TEST(FusedPath, ARunawayDoesNotDrawThePathAlong) {
   const FusedPath before = fuse_path(walk.run, clean, guess, with_arm(), {}, {});
   const FusedPath after = fuse_path(walk.run, away, guess, with_arm(), {}, {});
   ASSERT_TRUE(before.found && after.found);
-  EXPECT_LT(error_m(walk, away, after), error_m(walk, clean, before) + 0.5);
+  EXPECT_LT(place_error_m(walk, away, after), place_error_m(walk, clean, before) + 0.5);
 }
 
 TEST(FusedPath, FewFixesWithoutAHeightAreLeftOut) {
-  const Walk walk(200, 0.0, 3);
-  auto fixes = received(walk, {0.0, 0.02, 60.0, 0.5}, 7);
+  const MappedWalk walk(200, 0.0, 3);
+  auto fixes = fixes_on_walk(walk, {0.0, 0.02, 60.0, 0.5}, 7);
   for (const std::size_t k : {20U, 90U, 150U})
     fixes[k].height_m = std::nan("");
   const FusedPath path = fuse_path(walk.run, fixes, first_guess(walk, fixes), with_arm(), {}, {});
   ASSERT_TRUE(path.found) << path.reason;
   EXPECT_LT(path.positions, fixes.size());
   EXPECT_LT(path.errors.slow_height_m, 1.0);  // the default is 4
-  EXPECT_LT(error_m(walk, fixes, path), 0.1);
+  EXPECT_LT(place_error_m(walk, fixes, path), 0.1);
 }
 
 TEST(FusedPath, FixesOfAnotherDayAreNamed) {
-  const Walk walk(50, 0.0, 1);
-  auto fixes = received(walk, {}, 2);
+  const MappedWalk walk(50, 0.0, 1);
+  auto fixes = fixes_on_walk(walk, {}, 2);
   for (GnssFix& fix : fixes)
     fix.stamp += from_seconds(86400.0);
   const FusedPath path = fuse_path(walk.run, fixes, kEnuFromWorld, with_arm(), {}, {});

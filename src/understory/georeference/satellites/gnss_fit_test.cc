@@ -12,11 +12,11 @@ namespace {
 
 using Eigen::Vector3d;
 
-const GeodeticPlace kPlace{62.5, 30.2, 140.0};
+const GeodeticPlace kDrivePlace{62.5, 30.2, 140.0};
 const Vector3d kAntenna(0.3, -0.2, 1.5);  // in the body frame
 
-// The world of a run in the frame east, north, up at kPlace.
-Pose enu_from_world() {
+// The world of a run in the frame east, north, up at kDrivePlace.
+Pose enu_from_drive() {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(2.2, Vector3d::UnitZ())), {0.0, 0.0, 0.0}};
 }
 
@@ -32,14 +32,14 @@ std::vector<StampedPose> drive(bool bends) {
 }
 
 // What a receiver on it says, a centimetre off; `late_s`: by its clock.
-std::vector<GnssFix> receiver(const std::vector<StampedPose>& poses, double late_s = 0.0) {
-  const EastNorthUp frame(kPlace);
+std::vector<GnssFix> fixes_on_drive(const std::vector<StampedPose>& poses, double late_s = 0.0) {
+  const EastNorthUp frame(kDrivePlace);
   Random random(6);
   std::vector<GnssFix> fixes;
   for (const StampedPose& pose : poses) {
     const Vector3d noise(0.01 * random.normal(), 0.01 * random.normal(), 0.01 * random.normal());
     const GeodeticPlace place =
-        frame.to_place(enu_from_world() * (pose.world_from_body * kAntenna) + noise);
+        frame.to_place(enu_from_drive() * (pose.world_from_body * kAntenna) + noise);
     GnssFix fix;
     fix.stamp = pose.stamp + from_seconds(late_s);
     fix.latitude_deg = place.latitude_deg;
@@ -50,19 +50,19 @@ std::vector<GnssFix> receiver(const std::vector<StampedPose>& poses, double late
   return fixes;
 }
 
-// East, north, up of a point of the path by the fit, in the frame of kPlace.
-Vector3d placed(const GnssFit& fit, const Vector3d& point_in_world) {
-  return EastNorthUp(kPlace).from_place(
-      EastNorthUp(*fit.origin).to_place(fit.enu_from_world * point_in_world));
+// East, north, up of a point of the path by the fit, in the frame of kDrivePlace.
+Vector3d enu_of_point(const GnssFit& fit, const Vector3d& point_in_world) {
+  return EastNorthUp(kDrivePlace)
+      .from_place(EastNorthUp(*fit.origin).to_place(fit.enu_from_world * point_in_world));
 }
 
 TEST(GnssFit, LaysAPathOnItsFixes) {
   const auto poses = drive(true);
-  const GnssFit fit = fit_to_gnss(poses, kAntenna, receiver(poses), {});
+  const GnssFit fit = fit_to_gnss(poses, kAntenna, fixes_on_drive(poses), {});
   ASSERT_TRUE(fit.path.found) << fit.path.reason;
   EXPECT_NEAR(yaw_of(fit.enu_from_world), 2.2, 1e-3);
   for (const Vector3d& point : {Vector3d(0.0, 0.0, 2.0), Vector3d(119.0, 4.0, 2.0)})
-    EXPECT_LT((placed(fit, point) - enu_from_world() * point).norm(), 0.05);
+    EXPECT_LT((enu_of_point(fit, point) - enu_from_drive() * point).norm(), 0.05);
   ASSERT_EQ(fit.fixes.size(), poses.size());
   EXPECT_EQ(fit.fixes_in_time, poses.size());
   for (const FittedFix& fitted : fit.fixes) {
@@ -74,7 +74,7 @@ TEST(GnssFit, LaysAPathOnItsFixes) {
 // A receiver that is two seconds behind lies off along the way, and hardly across it.
 TEST(GnssFit, ALateClockIsAnErrorAlongTheWay) {
   const auto poses = drive(true);
-  const GnssFit fit = fit_to_gnss(poses, kAntenna, receiver(poses, 2.0), {});
+  const GnssFit fit = fit_to_gnss(poses, kAntenna, fixes_on_drive(poses, 2.0), {});
   ASSERT_TRUE(fit.path.found);
   EXPECT_NEAR(fit.along_rms_m, 2.3, 0.5);  // two seconds at 1 to 1.25 m/s
   EXPECT_LT(fit.across_rms_m, 0.5);
@@ -83,11 +83,11 @@ TEST(GnssFit, ALateClockIsAnErrorAlongTheWay) {
 // A straight path fits the other way round as well: the clocks tell, or nothing does.
 TEST(GnssFit, TheClocksTellWhichWayAStraightPathWent) {
   const auto poses = drive(false);
-  const GnssFit fit = fit_to_gnss(poses, kAntenna, receiver(poses), {});
+  const GnssFit fit = fit_to_gnss(poses, kAntenna, fixes_on_drive(poses), {});
   ASSERT_TRUE(fit.path.found);
   EXPECT_FALSE(fit.ambiguous);
   EXPECT_NEAR(yaw_of(fit.enu_from_world), 2.2, 0.01);
-  const GnssFit timeless = fit_to_gnss(poses, kAntenna, receiver(poses, 1e6), {});
+  const GnssFit timeless = fit_to_gnss(poses, kAntenna, fixes_on_drive(poses, 1e6), {});
   ASSERT_TRUE(timeless.path.found);
   EXPECT_TRUE(timeless.ambiguous);
   EXPECT_EQ(timeless.fixes_in_time, 0U);
@@ -96,7 +96,7 @@ TEST(GnssFit, TheClocksTellWhichWayAStraightPathWent) {
 TEST(GnssFit, NoFixesAndNoHeights) {
   const auto poses = drive(true);
   EXPECT_FALSE(fit_to_gnss(poses, kAntenna, {}, {}).path.found);
-  std::vector<GnssFix> flat = receiver(poses);
+  std::vector<GnssFix> flat = fixes_on_drive(poses);
   for (GnssFix& fix : flat)
     fix.height_m = std::nan("");
   const GnssFit fit = fit_to_gnss(poses, kAntenna, flat, {});

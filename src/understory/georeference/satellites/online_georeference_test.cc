@@ -15,14 +15,14 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kDegree = M_PI / 180.0;
-const GeodeticPlace kPlace{62.9, 27.4, 140.0};
-const Vector3d kArm(0.3, -0.2, 1.1);
-const Vector3d kLine(0.4, 0.9, 0.05);  // to the second antenna
-const Pose kEnuFromWorld(Eigen::Quaterniond(Eigen::AngleAxisd(-2.4, Vector3d::UnitZ())),
-                         Vector3d(20.0, 5.0, -3.0));
+const GeodeticPlace kWalkPlace{62.9, 27.4, 140.0};
+const Vector3d kWalkArm(0.3, -0.2, 1.1);
+const Vector3d kWalkLine(0.4, 0.9, 0.05);  // to the second antenna
+const Pose kEnuFromWalk(Eigen::Quaterniond(Eigen::AngleAxisd(-2.4, Vector3d::UnitZ())),
+                        Vector3d(20.0, 5.0, -3.0));
 
 // A walk in bends, a pose each 0.1 s, 1 m/s after ten seconds of standing.
-Pose body_at(double time_s) {
+Pose walker_at(double time_s) {
   const double way_m = std::max(0.0, time_s - 10.0);
   const Vector3d place(way_m, 15.0 * std::sin(0.04 * way_m), 0.5 * std::sin(0.1 * way_m));
   return {Eigen::Quaterniond(
@@ -30,7 +30,7 @@ Pose body_at(double time_s) {
           place};
 }
 
-struct Receiver {
+struct TwoAntennaReceiver {
   double slow_m = 0.0;
   double fast_m = 0.02;
   double correlation_s = 60.0;
@@ -41,18 +41,19 @@ struct Receiver {
 };
 
 // A walk with fixes each half second, step by step.
-class Walk {
+class WalkWithFixes {
  public:
-  Walk(const Receiver& receiver, std::uint64_t seed, const OnlineGeoreferenceConfig& config = {})
+  WalkWithFixes(const TwoAntennaReceiver& receiver, std::uint64_t seed,
+                const OnlineGeoreferenceConfig& config = {})
       : receiver_(receiver), random_(seed), online_(config) {
     slow_ = normal();
   }
 
   GlobalPose step() {
     const double time_s = 0.1 * steps_;
-    if (steps_ % 5 == 0) online_.add_fix(fix_at(time_s), kArm, Vector3d(kArm + kLine));
+    if (steps_ % 5 == 0) online_.add_fix(fix_at(time_s), kWalkArm, Vector3d(kWalkArm + kWalkLine));
     ++steps_;
-    return online_.add_pose({stamp(time_s), world_from_first_ * body_at(time_s)});
+    return online_.add_pose({stamp(time_s), world_from_first_ * walker_at(time_s)});
   }
   GlobalPose until(double time_s) {
     GlobalPose pose;
@@ -77,9 +78,9 @@ class Walk {
 
   // East, north, up; then turns about these axes in degrees.
   [[nodiscard]] Eigen::Matrix<double, 6, 1> error(const GlobalPose& pose) const {
-    const Pose truth = kEnuFromWorld * body_at(time_s());
+    const Pose truth = kEnuFromWalk * walker_at(time_s());
     Eigen::Matrix<double, 6, 1> error;
-    error << EastNorthUp(kPlace).from_place(pose.place) - truth.translation(),
+    error << EastNorthUp(kWalkPlace).from_place(pose.place) - truth.translation(),
         so3_log(pose.enu_from_body * truth.rotation().conjugate()) / kDegree;
     return error;
   }
@@ -97,7 +98,7 @@ class Walk {
     slow_ = kept * slow_ + std::sqrt(1.0 - kept * kept) * normal();
     const Vector3d error = receiver_.slow_m * slow_ + receiver_.fast_m * normal();
     const GeodeticPlace place =
-        EastNorthUp(kPlace).to_place(kEnuFromWorld * (body_at(time_s) * kArm) + error);
+        EastNorthUp(kWalkPlace).to_place(kEnuFromWalk * (walker_at(time_s) * kWalkArm) + error);
     GnssFix fix;
     fix.stamp = stamp(time_s);
     fix.latitude_deg = place.latitude_deg;
@@ -106,7 +107,7 @@ class Walk {
     fix.covariance = std::pow(receiver_.stated_m, 2.0) * Eigen::Matrix3d::Identity();
     fix.quality = 1;
     if (receiver_.headings) {
-      const Vector3d line = kEnuFromWorld.rotation() * (body_at(time_s).rotation() * kLine);
+      const Vector3d line = kEnuFromWalk.rotation() * (walker_at(time_s).rotation() * kWalkLine);
       fix.heading_deg =
           std::fmod(std::atan2(line.x(), line.y()) / kDegree + receiver_.wrong_deg + 720.0, 360.0);
       fix.heading_sd_deg = 0.4;
@@ -114,7 +115,7 @@ class Walk {
     return fix;
   }
 
-  Receiver receiver_;
+  TwoAntennaReceiver receiver_;
   Random random_;
   OnlineGeoreference online_;
   Vector3d slow_;
@@ -123,7 +124,7 @@ class Walk {
 };
 
 TEST(OnlineGeoreference, TheHeadingIsKnownOnceTheBodyHasWalked) {
-  Walk walk({}, 1);
+  WalkWithFixes walk({}, 1);
   const GlobalPose first = walk.step();
   EXPECT_FALSE(first.known);
   EXPECT_TRUE(std::isnan(first.place.latitude_deg));
@@ -138,21 +139,21 @@ TEST(OnlineGeoreference, TheHeadingIsKnownOnceTheBodyHasWalked) {
   EXPECT_LT(std::abs(walk.error(walked)(5)), 0.3);
   EXPECT_LT(walk.error(walked).segment<2>(3).norm(), 0.2);
   EXPECT_LT(walked.place_sd_m.maxCoeff(), 0.3);
-  EXPECT_EQ(walked.stamp, Walk::stamp(60.0));
+  EXPECT_EQ(walked.stamp, WalkWithFixes::stamp(60.0));
 }
 
 // What is not received yet has no say.
 TEST(OnlineGeoreference, AFixAfterThePoseDoesNotCount) {
-  Walk walk({}, 2);
-  Walk other({}, 2);
+  WalkWithFixes walk({}, 2);
+  WalkWithFixes other({}, 2);
   (void)walk.until(40.0);
   (void)other.until(40.0);
   GnssFix later;
-  later.stamp = Walk::stamp(40.35);
-  later.latitude_deg = kPlace.latitude_deg + 0.01;
-  later.longitude_deg = kPlace.longitude_deg;
+  later.stamp = WalkWithFixes::stamp(40.35);
+  later.latitude_deg = kWalkPlace.latitude_deg + 0.01;
+  later.longitude_deg = kWalkPlace.longitude_deg;
   later.quality = 1;
-  other.online().add_fix(later, kArm);
+  other.online().add_fix(later, kWalkArm);
   const GlobalPose one = walk.step();
   const GlobalPose two = other.step();
   EXPECT_EQ(one.place.latitude_deg, two.place.latitude_deg);
@@ -163,7 +164,7 @@ TEST(OnlineGeoreference, StatedErrorsHoldFromTheFirstScanOn) {
   Eigen::Matrix<double, 6, 1> known = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 1> within = known;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    Walk walk({2.0, 0.3, 20.0 + 10.0 * static_cast<double>(seed), 1.0, true}, seed);
+    WalkWithFixes walk({2.0, 0.3, 20.0 + 10.0 * static_cast<double>(seed), 1.0, true}, seed);
     for (int step = 0; step < 2000; ++step) {
       const GlobalPose pose = walk.step();
       if (!pose.known) continue;
@@ -184,8 +185,8 @@ TEST(OnlineGeoreference, StatedErrorsHoldFromTheFirstScanOn) {
 }
 
 TEST(OnlineGeoreference, AWorldThatIsMovedMovesNothingOnTheGlobe) {
-  Walk walk({}, 4);
-  Walk moved({}, 4);
+  WalkWithFixes walk({}, 4);
+  WalkWithFixes moved({}, 4);
   (void)walk.until(80.0);
   (void)moved.until(80.0);
   moved.move_world(Pose(so3_exp(Vector3d(0.0, 0.0, 0.3)), Vector3d(5.0, -2.0, 1.0)));
@@ -195,7 +196,7 @@ TEST(OnlineGeoreference, AWorldThatIsMovedMovesNothingOnTheGlobe) {
 }
 
 TEST(OnlineGeoreference, ANewPieceOfMapIsFoundAnew) {
-  Walk walk({}, 5);
+  WalkWithFixes walk({}, 5);
   ASSERT_TRUE(walk.until(60.0).heading_known);
   walk.begin_piece();
   EXPECT_FALSE(walk.step().known);
@@ -205,9 +206,9 @@ TEST(OnlineGeoreference, ANewPieceOfMapIsFoundAnew) {
 }
 
 TEST(OnlineGeoreference, WithoutHeightsThePlaneIsKnown) {
-  Receiver receiver;
+  TwoAntennaReceiver receiver;
   receiver.heights = false;
-  Walk walk(receiver, 6);
+  WalkWithFixes walk(receiver, 6);
   const GlobalPose pose = walk.until(60.0);
   EXPECT_TRUE(pose.heading_known);
   EXPECT_FALSE(pose.height_known);
@@ -218,35 +219,35 @@ TEST(OnlineGeoreference, WithoutHeightsThePlaneIsKnown) {
 
 // A receiver that begins with a place of yesterday.
 TEST(OnlineGeoreference, AFirstFixOfAnotherPlaceIsForgotten) {
-  Walk walk({}, 7);
+  WalkWithFixes walk({}, 7);
   GnssFix elsewhere;
-  elsewhere.stamp = Walk::stamp(0.0);
+  elsewhere.stamp = WalkWithFixes::stamp(0.0);
   elsewhere.latitude_deg = 60.0;
   elsewhere.longitude_deg = 25.0;
   elsewhere.quality = 1;
-  walk.online().add_fix(elsewhere, kArm);
+  walk.online().add_fix(elsewhere, kWalkArm);
   const GlobalPose pose = walk.until(150.0);
   ASSERT_TRUE(pose.heading_known);
   EXPECT_LT(walk.error(pose).head<2>().norm(), 0.15);
 }
 
 // The same walk with an estimate that was saved and read again.
-Walk gone_on(Walk& walk) {
+WalkWithFixes gone_on(WalkWithFixes& walk) {
   BinaryWriter saved;
   walk.online().save(saved);
   OnlineGeoreference again{OnlineGeoreferenceConfig()};
   BinaryReader reader(saved.bytes(), "state");
   again.load(reader);
   EXPECT_TRUE(reader.at_end());
-  Walk other = walk;
+  WalkWithFixes other = walk;
   other.go_on_with(again);
   return other;
 }
 
 TEST(OnlineGeoreference, TheStateIsKeptToTheBit) {
-  Walk walk({1.0, 0.3, 30.0, 0.5, true}, 8);
+  WalkWithFixes walk({1.0, 0.3, 30.0, 0.5, true}, 8);
   (void)walk.until(33.3);
-  Walk other = gone_on(walk);
+  WalkWithFixes other = gone_on(walk);
   for (int step = 0; step < 400; ++step) {
     const GlobalPose one = walk.step();
     const GlobalPose two = other.step();
@@ -258,10 +259,10 @@ TEST(OnlineGeoreference, TheStateIsKeptToTheBit) {
 
 // The carrier stands for ten seconds: only a second antenna can tell where it looks.
 TEST(OnlineGeoreference, ASecondAntennaTellsTheHeadingOfACarrierThatStands) {
-  Receiver receiver{1.0, 0.3, 30.0, 0.5, true};
-  EXPECT_FALSE(Walk(receiver, 8).until(9.0).heading_known);
+  TwoAntennaReceiver receiver{1.0, 0.3, 30.0, 0.5, true};
+  EXPECT_FALSE(WalkWithFixes(receiver, 8).until(9.0).heading_known);
   receiver.headings = true;
-  Walk walk(receiver, 8);
+  WalkWithFixes walk(receiver, 8);
   const GlobalPose pose = walk.until(9.0);
   ASSERT_TRUE(pose.heading_known);
   EXPECT_TRUE(walk.online().has_headings());
@@ -274,11 +275,11 @@ TEST(OnlineGeoreference, ASecondAntennaTellsTheHeadingOfACarrierThatStands) {
 
 // Swapped antennas turn the carrier about until the way tells better.
 TEST(OnlineGeoreference, HeadingsThatContradictTheWayAreLeftOut) {
-  Receiver receiver{0.3, 0.1, 30.0, 0.5, true};
-  const GlobalPose without = Walk(receiver, 8).until(80.0);
+  TwoAntennaReceiver receiver{0.3, 0.1, 30.0, 0.5, true};
+  const GlobalPose without = WalkWithFixes(receiver, 8).until(80.0);
   receiver.headings = true;
   receiver.wrong_deg = 180.0;
-  Walk walk(receiver, 8);
+  WalkWithFixes walk(receiver, 8);
   const GlobalPose pose = walk.until(80.0);
   EXPECT_TRUE(walk.online().contradicts_headings());
   ASSERT_TRUE(pose.heading_known);
@@ -287,11 +288,11 @@ TEST(OnlineGeoreference, HeadingsThatContradictTheWayAreLeftOut) {
 }
 
 TEST(OnlineGeoreference, GoesOnWithHeadingsWhereItStopped) {
-  Receiver receiver{1.0, 0.3, 30.0, 0.5, true};
+  TwoAntennaReceiver receiver{1.0, 0.3, 30.0, 0.5, true};
   receiver.headings = true;
-  Walk walk(receiver, 8);
+  WalkWithFixes walk(receiver, 8);
   (void)walk.until(23.3);
-  Walk other = gone_on(walk);
+  WalkWithFixes other = gone_on(walk);
   for (int step = 0; step < 100; ++step)
     ASSERT_EQ(walk.step().turn_sd_deg.z(), other.step().turn_sd_deg.z()) << step;
 }

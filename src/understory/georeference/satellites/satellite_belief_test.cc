@@ -15,10 +15,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-const GeodeticPlace kPlace{47.3, -71.2, 640.0};
-const Vector3d kArm(-0.3, 0.3, 1.5);
-const Pose kEnuFromWorld(Eigen::Quaterniond(Eigen::AngleAxisd(1.9, Vector3d::UnitZ())),
-                         Vector3d(8.0, -5.0, 2.0));
+const GeodeticPlace kSleighPlace{47.3, -71.2, 640.0};
+const Vector3d kSleighArm(-0.3, 0.3, 1.5);
+const Pose kEnuFromSleighWorld(Eigen::Quaterniond(Eigen::AngleAxisd(1.9, Vector3d::UnitZ())),
+                               Vector3d(8.0, -5.0, 2.0));
 
 constexpr double kStatedVariance = 3.0 * 0.03 * 0.03;
 
@@ -27,7 +27,7 @@ TimeNs stamp(double time_s) {
 }
 
 // A sleigh that stands for 5 s and then goes 2 m/s in bends.
-Pose body_at(double time_s) {
+Pose sleigh_at(double time_s) {
   const double way_m = 2.0 * std::max(0.0, time_s - 5.0);
   const double heading = 0.5 * std::sin(0.03 * way_m);
   const Vector3d place(way_m, 0.5 / 0.03 * (1.0 - std::cos(0.03 * way_m)), 0.0);
@@ -46,7 +46,7 @@ class Sleigh {
   }
   void step() {
     const double time_s = 0.1 * steps_;
-    if (steps_ % 2 == 0) belief_.add_fix(fix_at(time_s - early_s_), kArm, told_second_);
+    if (steps_ % 2 == 0) belief_.add_fix(fix_at(time_s - early_s_), kSleighArm, told_second_);
     const Pose truth = true_body(time_s);
     const Pose moved = steps_ > 0 ? true_body(time_s - 0.1).inverse() * truth : Pose();
     const double metres = moved.translation().norm();
@@ -78,14 +78,15 @@ class Sleigh {
 
  private:
   [[nodiscard]] Pose true_body(double time_s) const {
-    return body_at(std::min(time_s, stands_from_s_));
+    return sleigh_at(std::min(time_s, stands_from_s_));
   }
   GnssFix fix_at(double time_s) {
     const double x = random_.normal();
     const double y = random_.normal();
     const Vector3d error = 0.02 * Vector3d(x, y, random_.normal());
     const GeodeticPlace place =
-        EastNorthUp(kPlace).to_place(kEnuFromWorld * (true_body(time_s) * kArm) + error + jump_);
+        EastNorthUp(kSleighPlace)
+            .to_place(kEnuFromSleighWorld * (true_body(time_s) * kSleighArm) + error + jump_);
     GnssFix fix;
     fix.stamp = stamp(time_s);
     fix.latitude_deg = place.latitude_deg;
@@ -95,7 +96,7 @@ class Sleigh {
     fix.quality = 4;
     if (!second_) return fix;
     const Vector3d line =
-        kEnuFromWorld.rotation() * (true_body(time_s).rotation() * (*second_ - kArm));
+        kEnuFromSleighWorld.rotation() * (true_body(time_s).rotation() * (*second_ - kSleighArm));
     fix.heading_deg = std::remainder(std::atan2(line.x(), line.y()) / kDegree, 360.0);
     if (fix.heading_deg < 0.0) fix.heading_deg += 360.0;
     fix.heading_sd_deg = 0.2;
@@ -140,9 +141,9 @@ TEST(SatelliteBelief, BeginsAfterAFirstStretch) {
   const auto belief = sleigh.belief();
   ASSERT_TRUE(belief.has_value());
   // Where the odometry is right, it agrees.
-  EXPECT_LT((belief->target_from_source * kArm - sleigh.truth() * kArm).norm(), 0.4);
+  EXPECT_LT((belief->target_from_source * kSleighArm - sleigh.truth() * kSleighArm).norm(), 0.4);
   EXPECT_LT(std::abs(heading_difference(belief->target_from_source, sleigh.truth())), 0.01);
-  EXPECT_EQ(belief->point_in_source, kArm);
+  EXPECT_EQ(belief->point_in_source, kSleighArm);
 }
 
 // What the penalty is for: the map has drifted, the belief has not.
@@ -152,8 +153,8 @@ TEST(SatelliteBelief, StaysWhereTheFirstStretchLaidTheWorldWhileTheOdometryDrift
   ASSERT_TRUE(sleigh.filter().aligned());
   const auto belief = sleigh.belief();
   ASSERT_TRUE(belief.has_value());
-  const Vector3d drifted = sleigh.world_from_body() * kArm - sleigh.truth() * kArm;
-  const Vector3d error = belief->target_from_source * kArm - sleigh.truth() * kArm;
+  const Vector3d drifted = sleigh.world_from_body() * kSleighArm - sleigh.truth() * kSleighArm;
+  const Vector3d error = belief->target_from_source * kSleighArm - sleigh.truth() * kSleighArm;
   EXPECT_GT(drifted.norm(), 15.0);
   EXPECT_LT(error.norm(), 2.0) << "0.2 degrees of the first stretch's heading over 600 m";
   EXPECT_GT(heading_difference(sleigh.world_from_body(), sleigh.truth()), 5.0 * kDegree);
@@ -175,8 +176,8 @@ TEST(SatelliteBelief, AFixBetweenTwoScansIsCarriedOnFromItsOwnTime) {
     together.step();
     between.step();
     const Vector3d ahead = between.truth().rotation() * Vector3d::UnitX();
-    along_m += ahead.dot(between.belief()->target_from_source * kArm -
-                         together.belief()->target_from_source * kArm) /
+    along_m += ahead.dot(between.belief()->target_from_source * kSleighArm -
+                         together.belief()->target_from_source * kSleighArm) /
                kSteps;
   }
   EXPECT_LT(std::abs(along_m), 0.04);
@@ -206,8 +207,10 @@ TEST(SatelliteBelief, GravityIsTheImus) {
   const Vector3d expected =
       sleigh.world_from_body().rotation().conjugate() * (level.conjugate() * Vector3d::UnitZ());
   EXPECT_LT((up - expected).norm(), 1e-9);
-  EXPECT_LT((belief->target_from_source * kArm - sleigh.belief()->target_from_source * kArm).norm(),
-            1e-9)
+  EXPECT_LT(
+      (belief->target_from_source * kSleighArm - sleigh.belief()->target_from_source * kSleighArm)
+          .norm(),
+      1e-9)
       << "the antenna stays at the fix";
 }
 
@@ -223,19 +226,20 @@ TEST(SatelliteBelief, AFixSaysNothingOfWhatItsOwnErrorExplains) {
     each->until(60.0);
   ASSERT_TRUE(sleigh.filter().aligned());
   EXPECT_FALSE(sleigh.belief().has_value());
-  const Vector3d fix = to_the_fix.belief()->target_from_source * kArm;
+  const Vector3d fix = to_the_fix.belief()->target_from_source * kSleighArm;
   // A loop moves the path off the fixes.
   sleigh.move(Pose(Eigen::Quaterniond::Identity(), Vector3d(4.0, 0.0, 0.0)), false);
   const auto ahead = sleigh.belief();
   ASSERT_TRUE(ahead.has_value());
-  const Vector3d left = ahead->target_from_source * kArm - fix;
+  const Vector3d left = ahead->target_from_source * kSleighArm - fix;
   EXPECT_NEAR(left.head<2>().norm(), 12.0 * sd, 1e-6) << "the edge of what it allows";
   EXPECT_LT(ahead->position_covariance(0, 0), 0.1);
   EXPECT_GT(ahead->position_covariance(2, 2), 1e5) << "of the height it says nothing";
   config.followed_sd_m = 2.0 * sd;
   Sleigh good(config);
   good.until(60.0);
-  EXPECT_LT((good.belief()->target_from_source * kArm - fix).norm(), 1e-9) << "it is followed";
+  EXPECT_LT((good.belief()->target_from_source * kSleighArm - fix).norm(), 1e-9)
+      << "it is followed";
   sleigh.move(Pose(Eigen::Quaterniond::Identity(), Vector3d(-4.0, 0.0, 1.0)), false);
   const auto above = sleigh.belief();
   ASSERT_TRUE(above.has_value());
@@ -255,7 +259,7 @@ TEST(SatelliteBelief, TheCentreOfTurningIsAsFarOffAsTheAntenna) {
   sleigh.filter().note_match(information);
   const Pose here = sleigh.world_from_body();
   const Eigen::Quaterniond slipped = so3_exp(Vector3d(0.0, 0.0, 6.0 * kDegree)) * here.rotation();
-  const Pose predicted(slipped, here * kArm - slipped * kArm);
+  const Pose predicted(slipped, here * kSleighArm - slipped * kSleighArm);
   const auto belief = sleigh.filter().at({stamp(60.0), predicted});
   ASSERT_TRUE(belief.has_value());
   EXPECT_LT((belief->point_in_source - centre).norm(), 1e-6);
@@ -299,7 +303,7 @@ TEST(SatelliteBelief, ASecondAntennaTellsTheHeadingOfACarrierThatStands) {
 TEST(SatelliteBelief, AHeadingThatNoDriftExplainsDoesNotCount) {
   const Vector3d second(0.9, -0.5, 1.4);
   Sleigh sleigh(with(SatellitesInMatch::kPenalty));
-  sleigh.set_second(second, 2.0 * kArm - second);
+  sleigh.set_second(second, 2.0 * kSleighArm - second);
   sleigh.until(90.0);
   ASSERT_TRUE(sleigh.filter().aligned());
   EXPECT_FALSE(sleigh.filter().heading_at({stamp(90.0), sleigh.world_from_body()}).has_value());
@@ -335,7 +339,7 @@ TEST(SatelliteBelief, ThePriorIsTheFixAndTheCourse) {
   sleigh.until(250.0);
   const auto belief = sleigh.belief();
   ASSERT_TRUE(belief.has_value());
-  EXPECT_LT((belief->target_from_source * kArm - sleigh.truth() * kArm).norm(), 1.0);
+  EXPECT_LT((belief->target_from_source * kSleighArm - sleigh.truth() * kSleighArm).norm(), 1.0);
   const double off = heading_difference(sleigh.world_from_body(), sleigh.truth());
   EXPECT_GT(off, 3.0 * kDegree);
   EXPECT_LT(std::abs(heading_difference(belief->target_from_source, sleigh.truth())),
@@ -365,9 +369,9 @@ TEST(SatelliteBelief, LevellingTakesItAlongAndALoopDoesNot) {
   looped.move(turn, false);
   for (Sleigh* each : {&still, &levelled, &looped})
     each->step();
-  const Vector3d before = still.belief()->target_from_source * kArm;
-  EXPECT_LT((levelled.belief()->target_from_source * kArm - turn * before).norm(), 0.02);
-  EXPECT_LT((looped.belief()->target_from_source * kArm - before).norm(), 0.1)
+  const Vector3d before = still.belief()->target_from_source * kSleighArm;
+  EXPECT_LT((levelled.belief()->target_from_source * kSleighArm - turn * before).norm(), 0.02);
+  EXPECT_LT((looped.belief()->target_from_source * kSleighArm - before).norm(), 0.1)
       << "the last step of 0.2 m turned with it";
 }
 
@@ -377,12 +381,12 @@ TEST(SatelliteBelief, ALevelledWorldHasFixesAtTheirHeights) {
   config.place = PenaltyPlace::kAntenna;
   Sleigh sleigh(config);
   sleigh.until(60.0);
-  const double before = (sleigh.belief()->target_from_source * kArm).z();
+  const double before = (sleigh.belief()->target_from_source * kSleighArm).z();
   sleigh.move(Pose(so3_exp(Vector3d(0.05, -0.08, 0.0)), Vector3d::Zero()), true);
   sleigh.step();
   sleigh.step();
-  const double after = (sleigh.belief()->target_from_source * kArm).z();
-  EXPECT_GT((sleigh.world_from_body() * kArm).z(), before + 5.0) << "8 % of 110 m";
+  const double after = (sleigh.belief()->target_from_source * kSleighArm).z();
+  EXPECT_GT((sleigh.world_from_body() * kSleighArm).z(), before + 5.0) << "8 % of 110 m";
   // All the way from the end of the first stretch, 15 m from the origin, it lies level.
   EXPECT_LT(std::abs(after - before), 3.0);
 }

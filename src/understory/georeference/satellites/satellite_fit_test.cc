@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "understory/georeference/satellites/test_mast.h"
 #include "understory/util/random.h"
 #include "understory/util/time.h"
 
@@ -12,9 +13,8 @@ namespace understory {
 namespace {
 
 using Eigen::Vector3d;
-
-const GeodeticPlace kPlace{61.2, 25.1, 160.0};
-const Vector3d kArm(0.2, -0.3, 2.0);
+using test::kArm;
+using test::kPlace;
 
 Pose enu_from_world() {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(2.2, Vector3d::UnitZ())), {4.0, -3.0, 1.0}};
@@ -70,7 +70,7 @@ std::vector<GnssFix> received(const std::vector<StampedPose>& poses, const Recei
   return fixes;
 }
 
-SatelliteFitConfig usual() {
+SatelliteFitConfig usual_fit() {
   SatelliteFitConfig config;
   config.pairing.antenna_in_body = kArm;
   config.pairing.most_pairs = 80;  // quick
@@ -120,7 +120,7 @@ TEST(SatelliteFit, EveryMethodLaysAPathOnGoodFixes) {
   const auto fixes = received(poses, {0.01, 5.0, 0.01}, 3);
   for (const SatelliteMethod method :
        {SatelliteMethod::kClosed, SatelliteMethod::kFit3, SatelliteMethod::kSplit}) {
-    const SatelliteFit fit = fit_to_satellites(poses, fixes, method, usual());
+    const SatelliteFit fit = fit_to_satellites(poses, fixes, method, usual_fit());
     ASSERT_TRUE(fit.found) << fit.reason;
     EXPECT_LT(rms_error_m(fit, poses), 0.03);
     EXPECT_EQ(fit.fixes.size(), fixes.size());
@@ -140,8 +140,9 @@ TEST(SatelliteFit, CovariancesHoldUnderSlowErrorsThatTheReceiverUnderstates) {
                                    SatelliteMethod::kSplit}[static_cast<std::size_t>(m)];
     Vector6d squares = Vector6d::Zero();
     for (int draw = 0; draw < kDraws; ++draw) {
-      const SatelliteFit fit = fit_to_satellites(
-          poses, received(poses, receiver, static_cast<std::uint64_t>(draw + 50)), method, usual());
+      const SatelliteFit fit =
+          fit_to_satellites(poses, received(poses, receiver, static_cast<std::uint64_t>(draw + 50)),
+                            method, usual_fit());
       ASSERT_TRUE(fit.found) << fit.reason;
       // Truth in the frame of the fit: its origin is the first fix.
       const EastNorthUp at(kPlace);
@@ -171,12 +172,12 @@ TEST(SatelliteFit, CovariancesHoldUnderSlowErrorsThatTheReceiverUnderstates) {
 TEST(SatelliteFit, ALateClockIsFoundWhereItIsLookedFor) {
   const auto poses = walk();
   const auto fixes = received(poses, {0.1, 20.0, 0.02, 2.0, 0.8}, 5);
-  SatelliteFitConfig config = usual();
+  SatelliteFitConfig config = usual_fit();
   config.split.time_offset_sd_s = 1.0;
   const SatelliteFit fit = fit_to_satellites(poses, fixes, SatelliteMethod::kSplit, config);
   ASSERT_TRUE(fit.found);
   EXPECT_NEAR(fit.time_offset_s, -0.8, 0.1);
-  config = usual();
+  config = usual_fit();
   config.pairing.time_offset_s = -0.8;
   EXPECT_LT(fit_to_satellites(poses, fixes, SatelliteMethod::kSplit, config).plane_rms_m, 0.3);
 }
@@ -186,12 +187,12 @@ TEST(SatelliteFit, ABurstHasLittleSay) {
   auto fixes = received(poses, {0.3, 20.0, 0.1}, 6);
   for (std::size_t k = 200; k < 260; ++k)
     fixes[k].latitude_deg += 3e-4;  // 33 m for a minute
-  const SatelliteFit fit = fit_to_satellites(poses, fixes, SatelliteMethod::kSplit, usual());
+  const SatelliteFit fit = fit_to_satellites(poses, fixes, SatelliteMethod::kSplit, usual_fit());
   ASSERT_TRUE(fit.found);
   EXPECT_LT(rms_error_m(fit, poses), 0.8);
   EXPECT_FALSE(fit.fixes[230].used);
   EXPECT_TRUE(fit.fixes[100].used);
-  SatelliteFitConfig plain = usual();
+  SatelliteFitConfig plain = usual_fit();
   plain.split.robust = false;
   EXPECT_GT(rms_error_m(fit_to_satellites(poses, fixes, SatelliteMethod::kSplit, plain), poses),
             1.0);
@@ -201,7 +202,8 @@ TEST(SatelliteFit, ABurstHasLittleSay) {
 TEST(SatelliteFit, SixDegreesOfFreedomTakeTheTiltFromPoses) {
   const auto poses = walk();
   const auto fixes = received(poses, {3.0, 80.0, 0.3, 5.0}, 8);
-  const SatelliteFit closed = fit_to_satellites(poses, fixes, SatelliteMethod::kClosed, usual());
+  const SatelliteFit closed =
+      fit_to_satellites(poses, fixes, SatelliteMethod::kClosed, usual_fit());
   ASSERT_TRUE(closed.found);
   const Vector3d origin = EastNorthUp(kPlace).from_place(*closed.origin);
   std::vector<SmoothedPose> smoothed;
@@ -215,14 +217,14 @@ TEST(SatelliteFit, SixDegreesOfFreedomTakeTheTiltFromPoses) {
     smoothed.push_back(pose);
   }
   const SatelliteFit six =
-      fit_to_satellites(poses, fixes, SatelliteMethod::kFit6, usual(), smoothed);
+      fit_to_satellites(poses, fixes, SatelliteMethod::kFit6, usual_fit(), smoothed);
   ASSERT_TRUE(six.found) << six.reason;
   const auto tilt = [](const SatelliteFit& fit) {
     return std::acos((fit.enu_from_world.rotation() * Vector3d::UnitZ()).z());
   };
   EXPECT_LT(tilt(six), 0.003);
   EXPECT_GT(tilt(closed), 0.01);
-  EXPECT_FALSE(fit_to_satellites(poses, fixes, SatelliteMethod::kFit6, usual()).found);
+  EXPECT_FALSE(fit_to_satellites(poses, fixes, SatelliteMethod::kFit6, usual_fit()).found);
 }
 
 TEST(SatelliteFit, SaysWhatIsWrongWithTheFixes) {
@@ -231,26 +233,27 @@ TEST(SatelliteFit, SaysWhatIsWrongWithTheFixes) {
   auto other_day = good;
   for (GnssFix& fix : other_day)
     fix.stamp += from_seconds(86400.0);
-  const SatelliteFit late = fit_to_satellites(poses, other_day, SatelliteMethod::kSplit, usual());
+  const SatelliteFit late =
+      fit_to_satellites(poses, other_day, SatelliteMethod::kSplit, usual_fit());
   EXPECT_FALSE(late.found);
   EXPECT_NE(late.reason.find("1970-01-02"), std::string::npos) << late.reason;
-  EXPECT_FALSE(fit_to_satellites(poses, {}, SatelliteMethod::kSplit, usual()).found);
+  EXPECT_FALSE(fit_to_satellites(poses, {}, SatelliteMethod::kSplit, usual_fit()).found);
   auto swapped = good;
   for (GnssFix& fix : swapped)
     std::swap(fix.latitude_deg, fix.longitude_deg);
-  EXPECT_TRUE(fit_to_satellites(poses, swapped, SatelliteMethod::kSplit, usual()).swapped);
-  EXPECT_FALSE(fit_to_satellites(poses, good, SatelliteMethod::kSplit, usual()).swapped);
+  EXPECT_TRUE(fit_to_satellites(poses, swapped, SatelliteMethod::kSplit, usual_fit()).swapped);
+  EXPECT_FALSE(fit_to_satellites(poses, good, SatelliteMethod::kSplit, usual_fit()).swapped);
   auto flat = good;
   for (GnssFix& fix : flat)
     fix.height_m = std::nan("");
-  EXPECT_FALSE(fit_to_satellites(poses, flat, SatelliteMethod::kClosed, usual()).found);
-  const SatelliteFit plane = fit_to_satellites(poses, flat, SatelliteMethod::kSplit, usual());
+  EXPECT_FALSE(fit_to_satellites(poses, flat, SatelliteMethod::kClosed, usual_fit()).found);
+  const SatelliteFit plane = fit_to_satellites(poses, flat, SatelliteMethod::kSplit, usual_fit());
   ASSERT_TRUE(plane.found) << plane.reason;
   EXPECT_FALSE(plane.height_known);
   std::vector<StampedPose> still(poses.size(), poses.front());
   for (std::size_t k = 0; k < poses.size(); ++k)
     still[k].stamp = poses[k].stamp;
-  const SatelliteFit one = fit_to_satellites(still, good, SatelliteMethod::kSplit, usual());
+  const SatelliteFit one = fit_to_satellites(still, good, SatelliteMethod::kSplit, usual_fit());
   EXPECT_FALSE(one.found);
   EXPECT_NE(one.reason.find("spans"), std::string::npos) << one.reason;
 }
@@ -307,7 +310,7 @@ void add_headings(const std::vector<StampedPose>& poses, double sd_deg, double w
 }
 
 SatelliteFitConfig with_second_antenna() {
-  SatelliteFitConfig config = usual();
+  SatelliteFitConfig config = usual_fit();
   config.pairing.second_antenna_in_body = kArm + kLine;
   return config;
 }

@@ -6,15 +6,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/georeference/satellites/test_mast.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
 
 using Eigen::Vector3d;
+using test::kPlace;
 
-const GeodeticPlace kPlace{61.2, 25.1, 160.0};
-const Vector3d kArm(0.1, 0.0, 0.4);
+const Vector3d kShortArm(0.1, 0.0, 0.4);
 const Pose kBodyFromImu(so3_exp({0.2, -0.1, 0.7}), Vector3d(0.05, 0.1, -0.2));
 
 // East, north, up of the body on a walk of two minutes, at any time.
@@ -51,26 +52,26 @@ std::vector<ImuSample> measured(double until_s, const Vector3d& accel_bias) {
 }
 
 // A path in a world that is turned and tilted against east, north, up.
-Pose enu_from_world() {
+Pose enu_from_tilted_world() {
   return Pose(so3_exp({0.02, -0.03, 1.9}), Vector3d(3.0, -2.0, 5.0));
 }
 
 std::vector<StampedPose> path() {
   std::vector<StampedPose> poses;
   for (int k = 0; k < 1150; ++k)
-    poses.push_back(
-        {from_seconds(0.1 * k + 1.0), enu_from_world().inverse() * true_pose(0.1 * k + 1.0)});
+    poses.push_back({from_seconds(0.1 * k + 1.0),
+                     enu_from_tilted_world().inverse() * true_pose(0.1 * k + 1.0)});
   return poses;
 }
 
-std::vector<GnssFix> received(double sd_m) {
+std::vector<GnssFix> fixes_with_noise(double sd_m) {
   Random random(3);
   const EastNorthUp frame(kPlace);
   std::vector<GnssFix> fixes;
   for (int k = 2; k < 115; ++k) {
     const Vector3d noise(random.normal(0.0, sd_m), random.normal(0.0, sd_m),
                          random.normal(0.0, 3.0 * sd_m));
-    const GeodeticPlace place = frame.to_place(true_pose(k) * kArm + noise);
+    const GeodeticPlace place = frame.to_place(true_pose(k) * kShortArm + noise);
     GnssFix fix;
     fix.stamp = from_seconds(k);
     fix.latitude_deg = place.latitude_deg;
@@ -82,9 +83,9 @@ std::vector<GnssFix> received(double sd_m) {
   return fixes;
 }
 
-SatelliteSmoothingConfig usual() {
+SatelliteSmoothingConfig usual_smoothing() {
   SatelliteSmoothingConfig config;
-  config.pairing.antenna_in_body = kArm;
+  config.pairing.antenna_in_body = kShortArm;
   config.body_from_imu = kBodyFromImu;
   config.correlation_s = 0.5;
   config.overconfidence = 1.0;
@@ -93,12 +94,12 @@ SatelliteSmoothingConfig usual() {
 
 // Positions and samples without errors give the true poses, from a start that is 10 degrees off.
 TEST(SatelliteSmoothing, GivesTheTruePosesFromAWrongStart) {
-  const auto fixes = received(0.01);
+  const auto fixes = fixes_with_noise(0.01);
   const Vector3d origin = EastNorthUp(kPlace).from_place(
       {fixes[0].latitude_deg, fixes[0].longitude_deg, fixes[0].height_m});
-  const Pose wrong = Pose(so3_exp({0.05, 0.05, 0.17}), -origin) * enu_from_world();
+  const Pose wrong = Pose(so3_exp({0.05, 0.05, 0.17}), -origin) * enu_from_tilted_world();
   const auto smoothed = smooth_satellites(
-      path(), fixes, measured(120.0, Vector3d(0.03, -0.02, 0.05)), wrong, usual());
+      path(), fixes, measured(120.0, Vector3d(0.03, -0.02, 0.05)), wrong, usual_smoothing());
   ASSERT_GT(smoothed.size(), 100U);
   for (std::size_t k = 5; k + 5 < smoothed.size(); ++k) {
     const Pose truth = true_pose(to_seconds(smoothed[k].stamp));
@@ -117,29 +118,32 @@ TEST(SatelliteSmoothing, GivesTheTruePosesFromAWrongStart) {
 // Fixes that err by metres are smoothed, and up is that of gravity. The fit in six degrees of
 // freedom takes the tilt of the run from it.
 TEST(SatelliteSmoothing, TheTiltOfARunComesFromGravity) {
-  const auto fixes = received(2.0);
+  const auto fixes = fixes_with_noise(2.0);
   const auto samples = measured(120.0, Vector3d(0.02, 0.02, 0.0));
   SatelliteFitConfig config;
-  config.pairing.antenna_in_body = kArm;
+  config.pairing.antenna_in_body = kShortArm;
   const SatelliteFit split = fit_to_satellites(path(), fixes, SatelliteMethod::kSplit, config);
   ASSERT_TRUE(split.found);
-  const auto smoothed = smooth_satellites(path(), fixes, samples, split.enu_from_world, usual());
+  const auto smoothed =
+      smooth_satellites(path(), fixes, samples, split.enu_from_world, usual_smoothing());
   const SatelliteFit six =
       fit_to_satellites(path(), fixes, SatelliteMethod::kFit6, config, smoothed);
   ASSERT_TRUE(six.found) << six.reason;
   const auto tilt_error = [](const SatelliteFit& fit) {
     const Vector3d up = fit.enu_from_world.rotation() * Vector3d::UnitZ();
-    return std::acos(std::min(1.0, up.dot(enu_from_world().rotation() * Vector3d::UnitZ())));
+    return std::acos(std::min(1.0, up.dot(enu_from_tilted_world().rotation() * Vector3d::UnitZ())));
   };
   EXPECT_LT(tilt_error(six), 0.005);
   EXPECT_GT(tilt_error(split), 0.02);  // which believes that the run is level
 }
 
 TEST(SatelliteSmoothing, NothingWithoutSamples) {
-  EXPECT_TRUE(smooth_satellites(path(), received(1.0), {}, enu_from_world(), usual()).empty());
-  EXPECT_TRUE(
-      smooth_satellites(path(), {}, measured(5.0, Vector3d::Zero()), enu_from_world(), usual())
-          .empty());
+  EXPECT_TRUE(smooth_satellites(path(), fixes_with_noise(1.0), {}, enu_from_tilted_world(),
+                                usual_smoothing())
+                  .empty());
+  EXPECT_TRUE(smooth_satellites(path(), {}, measured(5.0, Vector3d::Zero()),
+                                enu_from_tilted_world(), usual_smoothing())
+                  .empty());
 }
 
 }  // namespace

@@ -167,14 +167,14 @@ Vector3d place_at(const std::vector<StampedPose>& path, TimeNs stamp) {
 }
 
 // Root mean square over the truth's times, in the plane and in height.
-struct Error {
+struct PathError {
   double plane_m = 0.0;
   double height_m = 0.0;
 };
 
 template <typename At>
-Error error_of(const Robot& robot, const At& at) {
-  Error error;
+PathError path_error_of(const Robot& robot, const At& at) {
+  PathError error;
   const auto count = static_cast<double>(robot.stamps.size());
   for (std::size_t i = 0; i < robot.stamps.size(); ++i) {
     const Vector3d off = at(i) - robot.in_enu[i];
@@ -220,8 +220,8 @@ std::vector<StampedPose> calibrated(const Robot& robot, const Degraded& degraded
   return best;
 }
 
-Error positions_alone(const Robot& robot, const Degraded& degraded) {
-  return error_of(robot, [&](std::size_t i) -> Vector3d {
+PathError positions_alone(const Robot& robot, const Degraded& degraded) {
+  return path_error_of(robot, [&](std::size_t i) -> Vector3d {
     const std::size_t before = std::min(i / kEvery, degraded.in_enu.size() - 1);
     const std::size_t after = std::min(before + 1, degraded.in_enu.size() - 1);
     const double share = static_cast<double>(i - before * kEvery) / static_cast<double>(kEvery);
@@ -239,7 +239,7 @@ TEST(WheelOdometry, FusedWithBadPositionsIsBetterThanEither) {
   EXPECT_NEAR(robot.origin.longitude_deg, -71.15, 0.05);
   // No start could do better than the best motion onto the truth.
   const Eigen::Matrix4d laid = laid_on(robot.odometry, robot.stamps, robot.in_enu, false);
-  const Error reckoned = error_of(
+  const PathError reckoned = path_error_of(
       robot, [&](std::size_t i) { return moved(laid, place_at(robot.odometry, robot.stamps[i])); });
   std::printf("wheel odometry alone, laid on the truth: %.2f m in the plane\n", reckoned.plane_m);
   SplitFitConfig split;
@@ -257,14 +257,14 @@ TEST(WheelOdometry, FusedWithBadPositionsIsBetterThanEither) {
     const GnssFix& first = degraded.fixes.front();
     const Pose into =
         change_of_frame({first.latitude_deg, first.longitude_deg, first.height_m}, robot.origin);
-    const Error error = error_of(robot, [&](std::size_t i) -> Vector3d {
+    const PathError error = path_error_of(robot, [&](std::size_t i) -> Vector3d {
       return into * place_at(fused.enu_from_body, robot.stamps[i]);
     });
     // The same odometry laid on the same positions as a whole.
-    const Error rigid = error_of(robot, [&](std::size_t i) -> Vector3d {
+    const PathError rigid = path_error_of(robot, [&](std::size_t i) -> Vector3d {
       return into * (guess.enu_from_world * place_at(run.trajectory, robot.stamps[i]));
     });
-    const Error alone = positions_alone(robot, degraded);
+    const PathError alone = positions_alone(robot, degraded);
     std::printf(
         "seed %d: positions alone %.2f m, odometry laid on them %.2f m, fused %.2f m in the plane, "
         "%.2f m expected; heights %.2f m, %.2f m, %.2f m; odometry scale %.2f\n",

@@ -3,19 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include "understory/graph/loops/test_bumpy_stand.h"
 #include "understory/registration/test_stand.h"
 #include "understory/util/angles.h"
 
 namespace understory {
 namespace {
 
-testing::Stand stand(std::uint64_t seed) {
-  testing::StandOptions options;
-  options.half_width_m = 60.0;
-  auto made = testing::make_stand(options, seed);
-  made.bump_m = 0.4;
-  return made;
-}
+using test::bumpy_stand;
 
 Points scan(const testing::Stand& made, const Pose& world_from_body, std::uint64_t seed) {
   testing::Pattern pattern = testing::os0_128();
@@ -33,7 +28,7 @@ Pose pose_at(double x, double y, double heading_deg) {
 // is at `candidate`.
 struct Scene {
   Scene(const Pose& query, const Pose& candidate, std::uint64_t seed = 3) {
-    const testing::Stand made = stand(seed);
+    const testing::Stand made = bumpy_stand(60.0, 700.0, seed);
     std::vector<Points> clouds;
     for (int i = 0; i < 3; ++i) {
       const Pose there = query * Pose(Eigen::Quaterniond::Identity(), {-0.5 - i, 0.0, 0.0});

@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "understory/geometry/voxel_key.h"
+#include "understory/graph/loops/test_bumpy_stand.h"
 #include "understory/registration/test_stand.h"
 #include "understory/util/angles.h"
 #include "understory/util/parallel.h"
@@ -14,16 +15,9 @@
 namespace understory {
 namespace {
 
-testing::Stand stand(std::uint64_t seed) {
-  testing::StandOptions options;
-  options.half_width_m = 45.0;
-  options.stems_per_hectare = 800.0;
-  auto made = testing::make_stand(options, seed);
-  made.bump_m = 0.4;
-  return made;
-}
+using test::bumpy_stand;
 
-Pose pose_at(double x, double y, double heading_deg) {
+Pose tilted_pose_at(double x, double y, double heading_deg) {
   return {so3_exp({0.0, 0.0, heading_deg * kDegree}) * so3_exp({0.05, -0.03, 0.0}),
           Eigen::Vector3d(x, y, 1.6)};
 }
@@ -81,7 +75,8 @@ void expect_right(const LoopVerification& v, const Pose& truth) {
 
 TEST(LoopClosure, FindsThePlaceAgainFromASmallError) {
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
-    LoopInput input = make_input(stand(seed), pose_at(0, 0, 0), pose_at(4, 2, 170));
+    LoopInput input = make_input(bumpy_stand(45.0, 800.0, seed), tilted_pose_at(0, 0, 0),
+                                 tilted_pose_at(4, 2, 170));
     const Pose truth = input.target_from_source;
     input.target_from_source =
         input.target_from_source * Pose(so3_exp({0.0, 0.0, 0.03}), Eigen::Vector3d(0.4, -0.3, 0.2));
@@ -91,7 +86,8 @@ TEST(LoopClosure, FindsThePlaceAgainFromASmallError) {
 
 // Drift of metres and degrees: the search over starts finds it, the belief alone does not.
 TEST(LoopClosure, FindsThePlaceAgainAfterDrift) {
-  LoopInput input = make_input(stand(4), pose_at(0, 0, 0), pose_at(3, -4, 100));
+  LoopInput input =
+      make_input(bumpy_stand(45.0, 800.0, 4), tilted_pose_at(0, 0, 0), tilted_pose_at(3, -4, 100));
   const Pose truth = input.target_from_source;
   input.target_from_source =
       Pose(so3_exp({0.0, 0.0, 0.15}), Eigen::Vector3d(5.0, -4.0, 0.5)) * input.target_from_source;
@@ -109,7 +105,8 @@ TEST(LoopClosure, FindsThePlaceAgainAfterDrift) {
 // Another place of the same stand, or another stand altogether, is no loop, wherever it is started.
 TEST(LoopClosure, OtherPlacesAreRejected) {
   for (std::uint64_t seed = 5; seed <= 6; ++seed) {
-    LoopInput input = make_input(stand(seed), pose_at(-25, -20, 0), pose_at(25, 20, 100));
+    LoopInput input = make_input(bumpy_stand(45.0, 800.0, seed), tilted_pose_at(-25, -20, 0),
+                                 tilted_pose_at(25, 20, 100));
     const Pose truth = input.target_from_source;
     input.target_from_source = Pose(so3_exp({0.0, 0.0, 1.0}), Eigen::Vector3d(1.0, 2.0, 0.0));
     input.sigma_translation_m = 4.0;
@@ -126,12 +123,13 @@ TEST(LoopClosure, NothingToGoBy) {
   EXPECT_FALSE(verify_loop(input, {}).accepted);
   // Bare ground, flat or sloping.
   testing::Stand bare;
-  input = make_input(bare, pose_at(0, 0, 0), pose_at(2, 0, 10));
+  input = make_input(bare, tilted_pose_at(0, 0, 0), tilted_pose_at(2, 0, 10));
   EXPECT_FALSE(verify_loop(input, {}).accepted);
 }
 
 TEST(LoopClosure, SameBitsForAnyNumberOfThreads) {
-  LoopInput input = make_input(stand(2), pose_at(0, 0, 0), pose_at(4, 2, 170));
+  LoopInput input =
+      make_input(bumpy_stand(45.0, 800.0, 2), tilted_pose_at(0, 0, 0), tilted_pose_at(4, 2, 170));
   input.sigma_translation_m = 1.5;
   input.sigma_rotation_rad = 0.05;
   std::vector<LoopVerification> results;

@@ -6,22 +6,16 @@
 #include <string>
 
 #include "understory/geometry/pose.h"
+#include "understory/graph/loops/test_bumpy_stand.h"
 #include "understory/registration/test_stand.h"
 #include "understory/util/angles.h"
 
 namespace understory {
 namespace {
 
-testing::Stand stand(std::uint64_t seed) {
-  testing::StandOptions options;
-  options.half_width_m = 45.0;
-  options.stems_per_hectare = 700.0;
-  auto made = testing::make_stand(options, seed);
-  made.bump_m = 0.4;
-  return made;
-}
+using test::bumpy_stand;
 
-Pose pose_at(double x, double y, double heading_deg) {
+Pose leaning_pose_at(double x, double y, double heading_deg) {
   return {so3_exp({0.0, 0.0, heading_deg * kDegree}) * so3_exp({0.06, -0.04, 0.0}),
           Eigen::Vector3d(x, y, 1.6)};
 }
@@ -38,9 +32,9 @@ UnplacedCloud seen_from(const testing::Stand& made, const Pose& world_from_body,
 
 // Facing another way and 9 m away: no guess helps.
 TEST(PlaceAgain, IsFoundFacingTheOtherWay) {
-  const testing::Stand made = stand(1);
-  const Pose first = pose_at(0, 0, 20);
-  const Pose second = pose_at(8, -4, 205);
+  const testing::Stand made = bumpy_stand(45.0, 700.0, 1);
+  const Pose first = leaning_pose_at(0, 0, 20);
+  const Pose second = leaning_pose_at(8, -4, 205);
   const LoopVerification found =
       verify_place_again(seen_from(made, first, 1), seen_from(made, second, 2), {});
   ASSERT_TRUE(found.accepted) << found.reason;
@@ -50,8 +44,9 @@ TEST(PlaceAgain, IsFoundFacingTheOtherWay) {
 }
 
 TEST(PlaceAgain, AnotherStandIsRefused) {
-  const LoopVerification found = verify_place_again(seen_from(stand(1), pose_at(0, 0, 0), 1),
-                                                    seen_from(stand(2), pose_at(3, 1, 60), 2), {});
+  const LoopVerification found =
+      verify_place_again(seen_from(bumpy_stand(45.0, 700.0, 1), leaning_pose_at(0, 0, 0), 1),
+                         seen_from(bumpy_stand(45.0, 700.0, 2), leaning_pose_at(3, 1, 60), 2), {});
   EXPECT_FALSE(found.accepted);
   EXPECT_FALSE(found.reason.empty());
 }
@@ -59,7 +54,7 @@ TEST(PlaceAgain, AnotherStandIsRefused) {
 TEST(PlaceAgain, TooFewPointsAreRefusedWithTheReason) {
   const LoopVerification found =
       verify_place_again(make_unplaced({{1.0F, 2.0F, 0.0F}}, Eigen::Vector3d::UnitZ()),
-                         seen_from(stand(1), pose_at(0, 0, 0), 1), {});
+                         seen_from(bumpy_stand(45.0, 700.0, 1), leaning_pose_at(0, 0, 0), 1), {});
   EXPECT_FALSE(found.accepted);
   EXPECT_NE(found.reason.find("target cannot be judged"), std::string::npos) << found.reason;
 }

@@ -13,14 +13,14 @@ namespace {
 constexpr double kStep = 1e-4;  // m^2 and rad^2: variance of a step
 
 // A walk through a stand along a road and back on it: the views of the way back face the other way.
-struct Walk {
+struct WalkAndBack {
   std::vector<SparsePoints> views;
   std::vector<Pose> truth;
 };
 
 // `missed`: share of the stems in reach that a view does not see, another one each time.
 // `half_angle`: rad to each side of the way that a view sees.
-Walk walk_there_and_back(int views_each_way, double missed = 0.2, double half_angle = M_PI) {
+WalkAndBack walk_there_and_back(int views_each_way, double missed = 0.2, double half_angle = M_PI) {
   std::mt19937 random(17);
   std::uniform_real_distribution<double> along(-30.0, 2.0 * views_each_way + 30.0);
   std::uniform_real_distribution<double> across(-30.0, 30.0);
@@ -33,7 +33,7 @@ Walk walk_there_and_back(int views_each_way, double missed = 0.2, double half_an
     const double y = across(random);
     stand.emplace_back(x, y, std::sin(0.1 * x) + 0.05 * y);
   }
-  Walk walk;
+  WalkAndBack walk;
   for (int i = 0; i < 2 * views_each_way; ++i) {
     const bool back = i >= views_each_way;
     const double x = 2.0 * (back ? 2 * views_each_way - 1 - i : i);
@@ -60,7 +60,7 @@ struct Found {
   int verified = 0;
 };
 // `turn`: what the odometry gets wrong at each step.
-Found loops_of_the_way_back(const Walk& walk, StemLoopConfig config, double turn = 0.0) {
+Found loops_of_the_way_back(const WalkAndBack& walk, StemLoopConfig config, double turn = 0.0) {
   config.exclude_recent = 20;
   std::vector<Pose> odometry = walk.truth;
   const Pose wrong(Eigen::Quaterniond(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ())),
@@ -96,7 +96,7 @@ TEST(StemLoops, FindsTheWayBackWithoutAGuess) {
 
 // Other ones each time: neighbouring views laid together show what one of them misses.
 TEST(StemLoops, FindsTheWayBackWhereMostStemsAreMissed) {
-  const Walk walk = walk_there_and_back(60, 0.65);
+  const WalkAndBack walk = walk_there_and_back(60, 0.65);
   EXPECT_GE(loops_of_the_way_back(walk, {}).right, 48);
   StemLoopConfig single;
   single.gather_l0 = 0.0;
@@ -106,7 +106,7 @@ TEST(StemLoops, FindsTheWayBackWhereMostStemsAreMissed) {
 // Views of 180 degrees that face opposite ways have next to nothing in common: what is laid
 // together tells how they lie to each other.
 TEST(StemLoops, FindsTheWayBackWhereViewsFaceOppositeWays) {
-  const Walk walk = walk_there_and_back(60, 0.2, 0.5 * M_PI);
+  const WalkAndBack walk = walk_there_and_back(60, 0.2, 0.5 * M_PI);
   EXPECT_GE(loops_of_the_way_back(walk, {}).verified, 40);
   StemLoopConfig alone;
   alone.min_gathered_overlap = 1.0;
@@ -114,7 +114,7 @@ TEST(StemLoops, FindsTheWayBackWhereViewsFaceOppositeWays) {
 }
 
 // Adds points that are no stems, other ones in each view.
-void clutter(Walk& walk) {
+void clutter(WalkAndBack& walk) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   for (SparsePoints& view : walk.views) {
@@ -129,7 +129,7 @@ void clutter(Walk& walk) {
 
 // Over many views such points lie near each other by chance: two sights make no stem.
 TEST(StemLoops, FindsTheWayBackAmongMuchThatIsNoStem) {
-  Walk walk = walk_there_and_back(60);
+  WalkAndBack walk = walk_there_and_back(60);
   clutter(walk);
   EXPECT_GE(loops_of_the_way_back(walk, {}).verified, 40);
 }
@@ -137,7 +137,7 @@ TEST(StemLoops, FindsTheWayBackAmongMuchThatIsNoStem) {
 // Where the odometry errs, the motion within what was laid together is as wrong: the covariance
 // grows with it.
 TEST(StemLoops, WhatIsLaidTogetherCarriesTheErrorsOfTheSteps) {
-  const Walk walk = walk_there_and_back(60, 0.2, 0.5 * M_PI);
+  const WalkAndBack walk = walk_there_and_back(60, 0.2, 0.5 * M_PI);
   StemLoopConfig config;
   config.exclude_recent = 20;
   const auto shift_sd = [&](double step_variance) {
@@ -158,7 +158,7 @@ TEST(StemLoops, MotionsAreThoseOfTheViewsThemselves) {
 }
 
 TEST(StemLoops, NothingIsFoundWhereNothingReturns) {
-  Walk walk = walk_there_and_back(60);
+  WalkAndBack walk = walk_there_and_back(60);
   walk.views.resize(60);
   walk.truth.resize(60);
   StemLoopConfig config;

@@ -18,20 +18,20 @@ Vector6d step_variances() {
   return sd.cwiseAbs2();
 }
 
-struct Walk {
+struct DriftingWalk {
   std::vector<Pose> truth;
   std::vector<Pose> odometry;
 };
 
 // A winding way. What the steps get wrong has the sd of step_variances, times 3 in yaw and in the
 // plane, and is alike over `length` views.
-Walk walk(unsigned seed, double length) {
+DriftingWalk drifting_walk(unsigned seed, double length) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0.0, 1.0);
   Vector6d sd = step_variances().cwiseSqrt();
   sd.segment<3>(2) *= 3.0;
   const double share = length > 0.0 ? std::exp(-1.0 / length) : 0.0;
-  Walk result;
+  DriftingWalk result;
   Vector6d state;
   for (int c = 0; c < 6; ++c)
     state[c] = normal(random);
@@ -50,7 +50,7 @@ Walk walk(unsigned seed, double length) {
   return result;
 }
 
-std::vector<PathObservation> seen(const std::vector<Pose>& truth, int every, int gap) {
+std::vector<PathObservation> observed(const std::vector<Pose>& truth, int every, int gap) {
   std::vector<PathObservation> result;
   for (int j = 0; j + gap < kViews; j += every) {
     Vector6d sd;
@@ -63,7 +63,7 @@ std::vector<PathObservation> seen(const std::vector<Pose>& truth, int every, int
   return result;
 }
 
-double error_m(const std::vector<Pose>& poses, const std::vector<Pose>& truth) {
+double rms_error_m(const std::vector<Pose>& poses, const std::vector<Pose>& truth) {
   double squares = 0.0;
   for (std::size_t k = 0; k < poses.size(); ++k)
     squares += (poses[k].translation() - truth[k].translation()).squaredNorm();
@@ -75,15 +75,15 @@ TEST(PathProcess, TellsHowLongStepsErrAlikeAndByHowMuch) {
   double scale = 0.0;
   double alone = 0.0;
   for (unsigned seed = 1; seed <= 5; ++seed) {
-    const Walk smooth = walk(seed, 20.0);
+    const DriftingWalk smooth = drifting_walk(seed, 20.0);
     const PathProcessResult found =
-        regress_path(smooth.odometry, step_variances(), seen(smooth.truth, 4, 6), {});
+        regress_path(smooth.odometry, step_variances(), observed(smooth.truth, 4, 6), {});
     alike += found.length_views / 5.0;
     scale += found.scale / 5.0;
-    const Walk rough = walk(seed, 0.0);
-    alone +=
-        regress_path(rough.odometry, step_variances(), seen(rough.truth, 4, 6), {}).length_views /
-        5.0;
+    const DriftingWalk rough = drifting_walk(seed, 0.0);
+    alone += regress_path(rough.odometry, step_variances(), observed(rough.truth, 4, 6), {})
+                 .length_views /
+             5.0;
   }
   EXPECT_GT(alike, 10.0);
   EXPECT_LT(alike, 40.0);
@@ -98,25 +98,25 @@ TEST(PathProcess, BetweenMatchesItBeatsPowersWhereErrorsAreSmooth) {
   double by_powers = 0.0;
   double before = 0.0;
   for (unsigned seed = 1; seed <= 5; ++seed) {
-    const Walk smooth = walk(seed, 20.0);
-    const std::vector<PathObservation> observations = seen(smooth.truth, 19, 20);
-    before += error_m(smooth.odometry, smooth.truth);
-    regressed +=
-        error_m(regress_path(smooth.odometry, step_variances(), observations, {}).world_from_view,
-                smooth.truth);
+    const DriftingWalk smooth = drifting_walk(seed, 20.0);
+    const std::vector<PathObservation> observations = observed(smooth.truth, 19, 20);
+    before += rms_error_m(smooth.odometry, smooth.truth);
+    regressed += rms_error_m(
+        regress_path(smooth.odometry, step_variances(), observations, {}).world_from_view,
+        smooth.truth);
     std::vector<Pose> poses = smooth.odometry;
     for (const PathObservation& pair : observations)
       apply_power_correction(poses, std::vector<double>(poses.size(), 1.0), pair.j, pair.i,
                              pair.j_from_i, {});
-    by_powers += error_m(poses, smooth.truth);
+    by_powers += rms_error_m(poses, smooth.truth);
   }
   EXPECT_LT(by_powers, 0.5 * before);
   EXPECT_LT(regressed, 0.7 * by_powers);
 }
 
 TEST(PathProcess, AWrongMatchIsLeftOutAndWithoutAnyThePathStays) {
-  const Walk rough = walk(3, 8.0);
-  std::vector<PathObservation> observations = seen(rough.truth, 5, 12);
+  const DriftingWalk rough = drifting_walk(3, 8.0);
+  std::vector<PathObservation> observations = observed(rough.truth, 5, 12);
   Vector6d off;
   off << 0.0, 0.0, 0.02, 1.8, 0.0, 0.0;
   observations[11].j_from_i = observations[11].j_from_i * Pose::exp(off);
@@ -128,20 +128,20 @@ TEST(PathProcess, AWrongMatchIsLeftOutAndWithoutAnyThePathStays) {
   observations.erase(observations.begin() + 11);
   const PathProcessResult without =
       regress_path(rough.odometry, step_variances(), observations, {});
-  EXPECT_LT(error_m(found.world_from_view, without.world_from_view), 1e-9);
-  EXPECT_LT(error_m(found.world_from_view, rough.truth),
-            0.3 * error_m(rough.odometry, rough.truth));
+  EXPECT_LT(rms_error_m(found.world_from_view, without.world_from_view), 1e-9);
+  EXPECT_LT(rms_error_m(found.world_from_view, rough.truth),
+            0.3 * rms_error_m(rough.odometry, rough.truth));
   const PathProcessResult none = regress_path(rough.odometry, step_variances(), {}, {});
-  EXPECT_EQ(error_m(none.world_from_view, rough.odometry), 0.0);
+  EXPECT_EQ(rms_error_m(none.world_from_view, rough.odometry), 0.0);
 }
 
 // Observations that say what the path says already move nothing; sure ones are obeyed.
 TEST(PathProcess, SureMatchesAreObeyedByThePosesAsTheyAreBuilt) {
-  const Walk smooth = walk(4, 20.0);
-  std::vector<PathObservation> own = seen(smooth.odometry, 9, 30);
+  const DriftingWalk smooth = drifting_walk(4, 20.0);
+  std::vector<PathObservation> own = observed(smooth.odometry, 9, 30);
   const PathProcessResult still = regress_path(smooth.odometry, step_variances(), own, {});
-  EXPECT_LT(error_m(still.world_from_view, smooth.odometry), 1e-6);
-  std::vector<PathObservation> sure = seen(smooth.truth, 9, 30);
+  EXPECT_LT(rms_error_m(still.world_from_view, smooth.odometry), 1e-6);
+  std::vector<PathObservation> sure = observed(smooth.truth, 9, 30);
   for (PathObservation& pair : sure)
     pair.covariance *= 1e-6;
   PathProcessConfig config;

@@ -20,7 +20,7 @@ Vector6d random_twist(std::mt19937& random, double angle, double shift) {
   return xi;
 }
 
-std::vector<Pose> walk(int views, unsigned seed) {
+std::vector<Pose> random_walk(int views, unsigned seed) {
   std::mt19937 random(seed);
   std::vector<Pose> poses = {Pose::exp(random_twist(random, 1.0, 20.0))};
   Vector6d forward = Vector6d::Zero();
@@ -39,7 +39,7 @@ constexpr PowerCoefficient kAll[] = {PowerCoefficient::kIndex, PowerCoefficient:
                                      PowerCoefficient::kScrew};
 
 TEST(PowerCoefficients, FollowTheirEquations) {
-  const std::vector<Pose> poses = walk(12, 3);
+  const std::vector<Pose> poses = random_walk(12, 3);
   std::vector<double> errors;
   for (int k = 0; k < 12; ++k)
     errors.push_back(0.1 + 0.03 * k);
@@ -109,7 +109,7 @@ TEST(PowerCorrection, EndsWhereTheMatchSaysAndCarriesTheRest) {
   std::mt19937 random(4);
   for (const PowerForm form : {PowerForm::kPrinted, PowerForm::kCorrected}) {
     for (const PowerCoefficient which : kAll) {
-      const std::vector<Pose> before = walk(15, 6);
+      const std::vector<Pose> before = random_walk(15, 6);
       std::vector<Pose> after = before;
       PowerConfig config;
       config.form = form;
@@ -127,7 +127,7 @@ TEST(PowerCorrection, EndsWhereTheMatchSaysAndCarriesTheRest) {
 }
 
 TEST(PowerCorrection, FormsAreTheirEquations) {
-  const std::vector<Pose> before = walk(9, 2);
+  const std::vector<Pose> before = random_walk(9, 2);
   std::mt19937 random(12);
   const Pose ij = before[0].inverse() * before[8];
   const Pose match = ij * Pose::exp(random_twist(random, 0.2, 0.4));

@@ -80,7 +80,7 @@ Drive drive(unsigned seed) {
   return result;
 }
 
-double error_m(const std::vector<Pose>& poses, const std::vector<Pose>& truth) {
+double plane_error_m(const std::vector<Pose>& poses, const std::vector<Pose>& truth) {
   double squares = 0.0;
   for (std::size_t k = 0; k < poses.size(); ++k)
     squares += (poses[k].translation() - truth[k].translation()).head<2>().squaredNorm();
@@ -103,7 +103,7 @@ SelfCorrectionConfig with(CorrectionMethod method) {
 
 TEST(SelfCorrection, EveryMethodSharpensTheMapAndNoneBlursIt) {
   const Drive seen = drive(5);
-  const double before = error_m(seen.problem.world_from_view, seen.truth);
+  const double before = plane_error_m(seen.problem.world_from_view, seen.truth);
   const MapSharpness blurred = unseen(seen, seen.problem.world_from_view);
   for (const CorrectionMethod method :
        {CorrectionMethod::kPowers, CorrectionMethod::kPoseGraph, CorrectionMethod::kGaussianProcess,
@@ -113,7 +113,7 @@ TEST(SelfCorrection, EveryMethodSharpensTheMapAndNoneBlursIt) {
     EXPECT_LT(sharp.beta, 0.9 * blurred.beta) << static_cast<int>(method);
     EXPECT_LT(sharp.noise_mean_m, 0.7 * blurred.noise_mean_m) << static_cast<int>(method);
     const double share = method == CorrectionMethod::kPowers ? 1.0 : 0.7;
-    EXPECT_LT(error_m(result.world_from_view, seen.truth), share * before)
+    EXPECT_LT(plane_error_m(result.world_from_view, seen.truth), share * before)
         << static_cast<int>(method);
     EXPECT_GT(result.kept, 0);
     EXPECT_LE(result.kept, 20);
@@ -121,7 +121,7 @@ TEST(SelfCorrection, EveryMethodSharpensTheMapAndNoneBlursIt) {
   for (const CorrectionMethod method :
        {CorrectionMethod::kPowersPrinted, CorrectionMethod::kLattice}) {
     const SelfCorrectionResult result = self_correct(seen.problem, with(method));
-    EXPECT_LT(error_m(result.world_from_view, seen.truth), 1.05 * before)
+    EXPECT_LT(plane_error_m(result.world_from_view, seen.truth), 1.05 * before)
         << static_cast<int>(method);
   }
 }
@@ -135,7 +135,7 @@ TEST(SelfCorrection, TheMapByExpectedGainIsNearlyAsSharpAsWithTruePoses) {
   const MapSharpness best = map_sharpness(seen.problem.views, seen.truth, {}, {});
   EXPECT_LT(result.after.noise_mean_m, 1.25 * best.noise_mean_m);
   // The first pose is right and the rest hangs on it: a twentieth of a degree there is 9 cm here.
-  EXPECT_LT(error_m(result.world_from_view, seen.truth), 0.15);
+  EXPECT_LT(plane_error_m(result.world_from_view, seen.truth), 0.15);
 }
 
 // P0 table 1: the order of the same pairs, and with it what is reached.
@@ -165,14 +165,14 @@ TEST(SelfCorrection, PowersTakeTheirPairsInAnyOrderAskedFor) {
 // P0 section 3 proposes to choose and order the pairs by the association of Delaunay stars.
 TEST(SelfCorrection, PairsChosenByTheirStarsMendTheMap) {
   const Drive seen = drive(5);
-  const double before = error_m(seen.problem.world_from_view, seen.truth);
+  const double before = plane_error_m(seen.problem.world_from_view, seen.truth);
   SelfCorrectionConfig config = with(CorrectionMethod::kPoseGraph);
   const SelfCorrectionResult disks = self_correct(seen.problem, config);
   config.pairs.rule = PairRule::kDelaunayStars;
   const SelfCorrectionResult stars = self_correct(seen.problem, config);
   EXPECT_LT(unseen(seen, stars.world_from_view).noise_mean_m,
             0.9 * unseen(seen, seen.problem.world_from_view).noise_mean_m);
-  EXPECT_LT(error_m(stars.world_from_view, seen.truth), 0.7 * before);
+  EXPECT_LT(plane_error_m(stars.world_from_view, seen.truth), 0.7 * before);
   ASSERT_EQ(stars.tried.size(), 20U);
   const auto mean_gap = [](const SelfCorrectionResult& result) {
     double sum = 0.0;
@@ -225,7 +225,7 @@ TEST(SelfCorrection, AMapThatIsRightIsLeftAlone) {
         CorrectionMethod::kPoseGraph, CorrectionMethod::kGaussianProcess,
         CorrectionMethod::kExpectedGain}) {
     const SelfCorrectionResult result = self_correct(seen.problem, with(method));
-    EXPECT_LT(error_m(result.world_from_view, seen.truth), 0.05) << static_cast<int>(method);
+    EXPECT_LT(plane_error_m(result.world_from_view, seen.truth), 0.05) << static_cast<int>(method);
   }
 }
 
@@ -244,7 +244,7 @@ TEST(SelfCorrection, ASolutionThatBlursTheMapIsRefused) {
        {CorrectionMethod::kPoseGraph, CorrectionMethod::kGaussianProcess,
         CorrectionMethod::kExpectedGain}) {
     const SelfCorrectionResult result = self_correct(seen.problem, with(method));
-    EXPECT_LT(error_m(result.world_from_view, seen.truth), 0.03) << static_cast<int>(method);
+    EXPECT_LT(plane_error_m(result.world_from_view, seen.truth), 0.03) << static_cast<int>(method);
     EXPECT_LT(result.blur.deviations, 2.0) << static_cast<int>(method);
     const auto accepted = [](const TriedCorrection& tried) { return tried.accepted; };
     EXPECT_TRUE(std::any_of(result.tried.begin(), result.tried.end(), accepted));

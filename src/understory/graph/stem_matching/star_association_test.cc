@@ -8,7 +8,7 @@
 namespace understory {
 namespace {
 
-SparsePoints stand(unsigned seed) {
+SparsePoints spaced_trees(unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> side(-25.0, 25.0);
   SparsePoints trees;
@@ -23,7 +23,7 @@ SparsePoints stand(unsigned seed) {
 }
 
 // A fifth of the trees missed, the others with noise.
-SparsePoints seen(const SparsePoints& trees, const Pose& view_from_world, unsigned seed) {
+SparsePoints seen_trees(const SparsePoints& trees, const Pose& view_from_world, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   std::normal_distribution<double> noise(0.0, 0.07);
@@ -41,12 +41,12 @@ Pose at(double yaw, double x, double y) {
 }
 
 TEST(StarAssociation, StemsOfOnePlaceFindTheirPartnersAndThoseOfAnotherDoNot) {
-  const SparsePoints trees = stand(1);
+  const SparsePoints trees = spaced_trees(1);
   const Pose a_from_world = at(0.3, 1.0, 2.0);
   const Pose b_from_world = at(-0.8, -2.0, 0.5);
-  const StarView a = stars_of(seen(trees, a_from_world, 2));
-  const StarView b = stars_of(seen(trees, b_from_world, 3));
-  const StarView stranger = stars_of(seen(stand(9), b_from_world, 4));
+  const StarView a = stars_of(seen_trees(trees, a_from_world, 2));
+  const StarView b = stars_of(seen_trees(trees, b_from_world, 3));
+  const StarView stranger = stars_of(seen_trees(spaced_trees(9), b_from_world, 4));
   const Pose a_from_b = a_from_world * b_from_world.inverse();
   // Two thirds of the trees are in both; with a guess that may be a metre off.
   const double same = associated_stems(a, b, a_from_b, 1.0, {});
@@ -60,9 +60,9 @@ TEST(StarAssociation, StemsOfOnePlaceFindTheirPartnersAndThoseOfAnotherDoNot) {
 
 // It is the stars that tell neighbours apart where the guess is worth little.
 TEST(StarAssociation, StarsTellWhatPlacesCannot) {
-  const SparsePoints trees = stand(5);
-  const StarView a = stars_of(seen(trees, Pose(), 6));
-  StarView b = stars_of(seen(trees, Pose(), 7));
+  const SparsePoints trees = spaced_trees(5);
+  const StarView a = stars_of(seen_trees(trees, Pose(), 6));
+  StarView b = stars_of(seen_trees(trees, Pose(), 7));
   const double with_stars = associated_stems(a, b, Pose(), 2.0, {});
   for (auto& star : b.stars)
     star.clear();

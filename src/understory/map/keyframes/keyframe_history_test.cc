@@ -19,7 +19,7 @@ Keyframe keyframe_at(double x) {
   return keyframe;
 }
 
-class KeyframeHistoryTest : public testing::Test {
+class KeyframeHistoryTest : public ::testing::Test {
  protected:
   void add(int count) {
     for (int i = 0; i < count; ++i)

@@ -34,7 +34,7 @@ struct Begun {
   KeyframeMap map;
 };
 
-KeyframeOffer at(double x) {
+KeyframeOffer offer_at(double x) {
   return {.world_from_body = Pose(Eigen::Quaterniond::Identity(), {x, 0.0, 0.0})};
 }
 
@@ -46,18 +46,18 @@ TEST(KeyframeChoice, TheFirstScanIsOneHoweverItMatched) {
   Log log;
   KeyframeMap map(config, folder.path(), times, log);
   map.start();
-  KeyframeOffer offer = at(0.0);
+  KeyframeOffer offer = offer_at(0.0);
   offer.fitness_m2 = 1.0;
   EXPECT_TRUE(map.wants(offer));
 }
 
 TEST(KeyframeChoice, DistanceAloneDecidesByDefault) {
   const Begun begun({});
-  KeyframeOffer offer = at(0.4);
+  KeyframeOffer offer = offer_at(0.4);
   offer.fitness_m2 = 50.0;
   offer.found_share = 0.1;
   EXPECT_FALSE(begun.map.wants(offer));
-  offer.world_from_body = at(0.6).world_from_body;
+  offer.world_from_body = offer_at(0.6).world_from_body;
   EXPECT_TRUE(begun.map.wants(offer));
 }
 
@@ -66,7 +66,7 @@ TEST(KeyframeChoice, AScanThatTheMapExplainsBadlyBecomesOneWhereAsked) {
   config.keyframe.above_fitness_m2 = 0.04;
   config.keyframe.below_found_share = 0.75;
   const Begun begun(config);
-  KeyframeOffer offer = at(0.1);
+  KeyframeOffer offer = offer_at(0.1);
   offer.fitness_m2 = 0.03;
   EXPECT_FALSE(begun.map.wants(offer));
   offer.fitness_m2 = 0.05;
@@ -80,7 +80,7 @@ TEST(KeyframeChoice, ABadMatchBecomesNoneWhereAsked) {
   KeyframeMap::Config config;
   config.keyframe.max_fitness_m2 = 0.04;
   const Begun begun(config);
-  KeyframeOffer offer = at(2.0);
+  KeyframeOffer offer = offer_at(2.0);
   offer.fitness_m2 = 0.05;
   EXPECT_FALSE(begun.map.wants(offer));
   offer.fitness_m2 = 0.03;
@@ -90,8 +90,8 @@ TEST(KeyframeChoice, ABadMatchBecomesNoneWhereAsked) {
 // The match left one direction open: there the edge is weak, and nowhere else.
 TEST(KeyframeEdges, AreWeakWhereTheMatchKnewNothing) {
   Begun begun({});
-  (void)begun.map.add(TimeNs{1}, at(1.0), some_points());
-  KeyframeOffer open = at(2.0);
+  (void)begun.map.add(TimeNs{1}, offer_at(1.0), some_points());
+  KeyframeOffer open = offer_at(2.0);
   open.covariance(4, 4) = 0.25;
   (void)begun.map.add(TimeNs{2}, open, some_points());
   const std::vector<PoseEdge> edges = begun.map.graph().odometry;

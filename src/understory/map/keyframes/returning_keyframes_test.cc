@@ -8,7 +8,7 @@
 namespace understory {
 namespace {
 
-constexpr double kRadiusM = 80.0;
+constexpr double kCircleRadiusM = 80.0;
 
 // A way out along x and back, a keyframe each metre.
 struct Way {
@@ -22,14 +22,14 @@ struct Way {
     std::vector<std::size_t> came;
     for (double x = 0.0; x < metres; x += 1.0) {
       go_to(x, held);
-      for (const std::size_t i : returning.take(keyframes, 0, kRadiusM))
+      for (const std::size_t i : returning.take(keyframes, 0, kCircleRadiusM))
         came.push_back(i);
     }
     return came;
   }
   std::vector<std::size_t> jump_to(double x, bool held) {
     go_to(x, held);
-    return returning.take(keyframes, 0, kRadiusM);
+    return returning.take(keyframes, 0, kCircleRadiusM);
   }
 
   std::vector<Keyframe> keyframes;
@@ -83,9 +83,9 @@ TEST(ReturningKeyframes, AMapMadeAnewHoldsAllWithinItsRadius) {
     in_map.push_back({i, 0});
   in_map.push_back({150, 0});
   way.returning.note_made_anew(in_map);
-  EXPECT_TRUE(way.returning.take(way.keyframes, 0, kRadiusM).empty());
+  EXPECT_TRUE(way.returning.take(way.keyframes, 0, kCircleRadiusM).empty());
   way.returning.note_made_anew({});
-  const std::vector<std::size_t> lacking = way.returning.take(way.keyframes, 0, kRadiusM);
+  const std::vector<std::size_t> lacking = way.returning.take(way.keyframes, 0, kCircleRadiusM);
   ASSERT_FALSE(lacking.empty()) << "what it lacks comes";
   EXPECT_EQ(lacking.front(), 10U);
 }

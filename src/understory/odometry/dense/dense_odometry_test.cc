@@ -18,7 +18,7 @@
 namespace understory {
 namespace {
 
-constexpr double kPeriod = 0.1;
+constexpr double kScanPeriodS = 0.1;
 
 // Somebody who walks straight on and looks left and right quickly, in a world whose origin is the
 // first pose.
@@ -53,12 +53,12 @@ class LookingAround : public ::testing::Test {
     scan.stamp = TestCarrier::stamp(t);
     constexpr int kSteps = 8;
     for (int step = 0; step < kSteps; ++step) {
-      const Pose pose = world_from_walker(t + kPeriod * (step + 0.5) / kSteps);
+      const Pose pose = world_from_walker(t + kScanPeriodS * (step + 0.5) / kSteps);
       for (const Eigen::Vector3f& p : seen_from(pose, static_cast<std::uint64_t>(1e3 * t) + 7)) {
         const double turned = std::atan2(p.y(), p.x()) / (2.0 * std::numbers::pi) + 0.5;
         if (static_cast<int>(turned * kSteps) != step) continue;
         scan.points.push_back({p.x(), p.y(), p.z(), 1.0F,
-                               static_cast<std::uint32_t>(1e9 * kPeriod * turned), 0, 0, 0});
+                               static_cast<std::uint32_t>(1e9 * kScanPeriodS * turned), 0, 0, 0});
       }
     }
     return scan;
@@ -83,7 +83,7 @@ class LookingAround : public ::testing::Test {
     double sum = 0.0;
     constexpr int kScans = 14;
     for (int i = 0; i < kScans; ++i) {
-      const double t = kPeriod * i;
+      const double t = kScanPeriodS * i;
       const Scan turn = scan(t);
       const DenseEstimate estimate = odometry.process(turn, local_map);
       EXPECT_EQ(estimate.scan_end, turn.end());
@@ -140,8 +140,8 @@ TEST_F(LookingAround, ALidarThatJoinsIsNoReasonToDoubtTheMatch) {
     odometry.set_initial_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
     const MatchTargetPtr local_map = map();
     for (int i = 0; i < 3; ++i)
-      EXPECT_TRUE(odometry.process(scan(kPeriod * i), local_map).matched);
-    return odometry.process(with_another_lidar(scan(kPeriod * 3), first_ring), local_map);
+      EXPECT_TRUE(odometry.process(scan(kScanPeriodS * i), local_map).matched);
+    return odometry.process(with_another_lidar(scan(kScanPeriodS * 3), first_ring), local_map);
   };
   EXPECT_TRUE(last_of(kRingsALidar).matched);
   // The same points by the lidar that was there before are a reason.
@@ -212,11 +212,11 @@ TEST_F(LookingAround, FewPointsCountIfTheyLieOnTheMapsSurfaces) {
     odometry.set_initial_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
     const MatchTargetPtr local_map = map();
     for (int i = 0; i < 3; ++i)
-      EXPECT_GT(odometry.process(scan(kPeriod * i), local_map).found_share, 0.9);
+      EXPECT_GT(odometry.process(scan(kScanPeriodS * i), local_map).found_share, 0.9);
     return odometry.process(last, local_map);
   };
   // Most of what it sees is not in the map, as where a scan's rings lie between those of the map.
-  const Scan mostly_new = with_another_lidar(scan(kPeriod * 3), 0);
+  const Scan mostly_new = with_another_lidar(scan(kScanPeriodS * 3), 0);
   EXPECT_FALSE(last_of(0.0, mostly_new).matched);
   const DenseEstimate counted = last_of(1.5, mostly_new);
   EXPECT_TRUE(counted.matched);
@@ -238,12 +238,12 @@ TEST_F(LookingAround, AScanThatIsMostlyNewIsLessSure) {
     odometry.set_initial_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
     const MatchTargetPtr local_map = map();
     for (int i = 0; i < 3; ++i)
-      EXPECT_TRUE(odometry.process(scan(kPeriod * i), local_map).matched);
+      EXPECT_TRUE(odometry.process(scan(kScanPeriodS * i), local_map).matched);
     const DenseEstimate estimate = odometry.process(last, local_map);
     EXPECT_TRUE(estimate.matched);
     return estimate.state.pose_covariance.diagonal().tail<3>().sum();
   };
-  const Scan seen = scan(kPeriod * 3);
+  const Scan seen = scan(kScanPeriodS * 3);
   const Scan mostly_new = with_another_lidar(seen, 0);
   EXPECT_GT(variance_after(mostly_new, 0.1), 4.0 * variance_after(seen, 0.1));
   EXPECT_NEAR(variance_after(mostly_new, 1.0), variance_after(seen, 1.0),
@@ -285,7 +285,7 @@ TEST_F(LookingAround, WhatGoesAlongIsNotMatched) {
     DenseOdometry odometry(config, Rig(), nullptr, times, log);
     odometry.set_initial_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
     for (int i = 0; i < 5; ++i) {
-      const Scan bare = scan(kPeriod * i);
+      const Scan bare = scan(kScanPeriodS * i);
       const DenseEstimate estimate = odometry.process(with_a_bar(bare), local_map);
       ASSERT_EQ(estimate.cloud.size(), bare.points.size() + 400);
       std::size_t of_bar = 0;

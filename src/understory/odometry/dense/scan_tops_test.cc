@@ -21,7 +21,7 @@ void add(const Eigen::Vector3f& point, BodyCloud& cloud) {
 }
 
 // Three crowns of 150 points 3 m below the body, a bush as dense below each, and flat ground, z up.
-BodyCloud stand(std::uint64_t seed) {
+BodyCloud crowns_and_bushes(std::uint64_t seed) {
   Random random(seed);
   BodyCloud cloud;
   cloud.stamp = 5;
@@ -53,11 +53,11 @@ ScanTopsConfig tops_only() {
 }
 
 TEST(ScanTops, AllPointsCountUnlessTopsAreAskedFor) {
-  EXPECT_FALSE(keep_tree_tops(stand(1), Pose(), ScanTopsConfig{}).has_value());
+  EXPECT_FALSE(keep_tree_tops(crowns_and_bushes(1), Pose(), ScanTopsConfig{}).has_value());
 }
 
 TEST(ScanTops, CrownsStayWithAllThatIsKnownOfTheirPoints) {
-  const BodyCloud cloud = stand(2);
+  const BodyCloud cloud = crowns_and_bushes(2);
   const auto tops = keep_tree_tops(cloud, Pose(), tops_only());
   ASSERT_TRUE(tops.has_value());
   EXPECT_EQ(tops->stamp, cloud.stamp);
@@ -77,7 +77,7 @@ TEST(ScanTops, UpIsThatOfTheWorld) {
   const Pose world_from_body(
       Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d(1.0, 2.0, 0.5).normalized())),
       Eigen::Vector3d(100.0, -50.0, 30.0));
-  const BodyCloud level = stand(3);
+  const BodyCloud level = crowns_and_bushes(3);
   BodyCloud turned = level;
   const Eigen::Matrix3f back = world_from_body.rotation_matrix().transpose().cast<float>();
   for (Eigen::Vector3f& point : turned.points)
@@ -97,9 +97,9 @@ TEST(ScanTops, UpIsThatOfTheWorld) {
 TEST(ScanTops, ScansWithFewOfThemKeepAllPoints) {
   ScanTopsConfig config = tops_only();
   config.least_points = 451;
-  EXPECT_FALSE(keep_tree_tops(stand(4), Pose(), config).has_value());
+  EXPECT_FALSE(keep_tree_tops(crowns_and_bushes(4), Pose(), config).has_value());
   config.least_points = 400;
-  EXPECT_TRUE(keep_tree_tops(stand(4), Pose(), config).has_value());
+  EXPECT_TRUE(keep_tree_tops(crowns_and_bushes(4), Pose(), config).has_value());
 }
 
 TEST(ScanTops, OfAnEmptyScanThereAreNone) {

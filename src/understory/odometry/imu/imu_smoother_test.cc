@@ -9,7 +9,7 @@
 namespace understory {
 namespace {
 
-struct Outcome {
+struct SmoothedRun {
   double position_rmse = 0.0;  // of the smoothed state against the truth, after the start
   double rotation_rmse_deg = 0.0;
   double velocity_rmse = 0.0;
@@ -45,7 +45,7 @@ struct Play {
 };
 
 void add_error(const NavState& state, const NavState& predicted, const Pose& truth,
-               const Eigen::Vector3d& velocity, Outcome& run) {
+               const Eigen::Vector3d& velocity, SmoothedRun& run) {
   const Vector6d error = right_difference(state.world_from_body, truth);
   run.rotation_rmse_deg += error.head<3>().squaredNorm() / (kDegree * kDegree);
   run.last_position_error = error.tail<3>().norm();
@@ -55,7 +55,7 @@ void add_error(const NavState& state, const NavState& predicted, const Pose& tru
 }
 
 // Sums of `n` squares to roots of their means, and what the model knows at the end.
-void finish(const MotionModel& model, const Eigen::Vector3d& up, int n, Outcome& run) {
+void finish(const MotionModel& model, const Eigen::Vector3d& up, int n, SmoothedRun& run) {
   for (double* sum :
        {&run.position_rmse, &run.rotation_rmse_deg, &run.velocity_rmse, &run.prediction_rmse})
     *sum = std::sqrt(*sum / n);
@@ -72,7 +72,7 @@ void finish(const MotionModel& model, const Eigen::Vector3d& up, int n, Outcome&
                 run.tilt_deg, run.gated);
 }
 
-Outcome play(const Play& setup) {
+SmoothedRun play(const Play& setup) {
   TestCarrier carrier(setup.carrier);
   Log log;
   Rig rig;
@@ -82,7 +82,7 @@ Outcome play(const Play& setup) {
                          : make_constant_velocity_model(setup.motion, &log);
   };
   auto model = make();
-  Outcome run;
+  SmoothedRun run;
   Pose model_from_truth;
   double imu_time = 0.0;
   int n = 0;
@@ -126,7 +126,7 @@ Outcome play(const Play& setup) {
   return run;
 }
 
-void expect_good(const Outcome& run) {
+void expect_good(const SmoothedRun& run) {
   // Better than one match (5 mm and 0.0286 deg per axis).
   EXPECT_LT(run.position_rmse, 0.0087);
   EXPECT_LT(run.rotation_rmse_deg, 0.0496);
@@ -150,7 +150,7 @@ TEST(ImuSmoother, PositionsWithTheirOwnCovarianceKeepItOnItsWay) {
     match->world_from_body = Pose(so3_exp(Eigen::Vector3d(0.3, -0.2, 0.5)) * there.rotation(),
                                   there.translation() + off);
   };
-  const Outcome run = play(setup);
+  const SmoothedRun run = play(setup);
   EXPECT_LT(run.position_rmse, 0.04);
   EXPECT_LT(run.rotation_rmse_deg, 1.0);
   EXPECT_EQ(run.gated, 0);
@@ -164,7 +164,7 @@ TEST(ImuSmoother, StatesErrorsOfTheSizeThatResidualsSpeakFor) {
   setup.motion = MotionConfig();
   std::vector<NavState> with;
   setup.states = &with;
-  const Outcome scaled = play(setup);
+  const SmoothedRun scaled = play(setup);
   std::vector<NavState> without;
   setup.states = &without;
   setup.motion.covariance_from_residuals = false;
@@ -200,7 +200,7 @@ TEST(ImuSmoother, AScanWithoutAMatchKeepsTheModelsCovariance) {
 TEST(ImuSmoother, FollowsFromAStillStart) {
   Play setup;
   setup.carrier.still_s = 2.0;
-  const Outcome run = play(setup);
+  const SmoothedRun run = play(setup);
   expect_good(run);
   EXPECT_EQ(run.how, Initialisation::kStill);
 }
@@ -209,7 +209,7 @@ TEST(ImuSmoother, FollowsFromAStartInMotion) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     Play setup;
     setup.carrier.seed = seed;
-    const Outcome run = play(setup);
+    const SmoothedRun run = play(setup);
     expect_good(run);
     EXPECT_EQ(run.how, Initialisation::kInMotion);
     EXPECT_TRUE(run.levelled);
@@ -226,7 +226,7 @@ TEST(ImuSmoother, Isam2FollowsToo) {
   Play setup;
   setup.motion.method = SmootherMethod::kIsam2;
   setup.motion.isam2_restart = 50;
-  Outcome run = play(setup);
+  SmoothedRun run = play(setup);
   // Gravity is fixed once iSAM2 takes over, so the levelling stays what it was after three seconds.
   EXPECT_LT(run.tilt_deg, 0.8);
   run.tilt_deg = 0.0;
@@ -238,7 +238,7 @@ TEST(ImuSmoother, ConstantVelocityWithoutImu) {
   setup.use_imu = false;
   std::vector<NavState> states;
   setup.states = &states;
-  const Outcome run = play(setup);
+  const SmoothedRun run = play(setup);
   EXPECT_EQ(run.how, Initialisation::kNoImu);
   EXPECT_LT(run.position_rmse, 0.012);
   EXPECT_LT(run.velocity_rmse, 0.4);
@@ -270,7 +270,7 @@ TEST(ImuSmoother, VelocityGateDropsWrongMatches) {
         match->world_from_body =
             match->world_from_body * Pose(Eigen::Quaterniond::Identity(), {0.4, 0.0, 0.0});
     };
-    const Outcome with = play(setup);
+    const SmoothedRun with = play(setup);
     EXPECT_EQ(with.gated, 2);
     EXPECT_LT(with.position_rmse, 0.0087);
     if (method == SmootherMethod::kIsam2) continue;
@@ -301,7 +301,7 @@ TEST(ImuSmoother, GateOpensWhenTheMatchesInsist) {
       match->world_from_body =
           Pose(Eigen::Quaterniond::Identity(), {0.5, 0.0, 0.0}) * match->world_from_body;
   };
-  const Outcome run = play(setup);
+  const SmoothedRun run = play(setup);
   EXPECT_EQ(run.gated, 5);
   EXPECT_NEAR(run.last_position_error, 0.5, 0.03);
 }
@@ -309,7 +309,7 @@ TEST(ImuSmoother, GateOpensWhenTheMatchesInsist) {
 TEST(ImuSmoother, GapsAndEndOfTheImu) {
   Play setup;
   setup.imu_there = [](double t) { return (t < 10.0 || t > 10.35) && t < 20.0; };
-  const Outcome run = play(setup);
+  const SmoothedRun run = play(setup);
   EXPECT_LT(run.position_rmse, 0.02);
   EXPECT_EQ(run.gated, 0);
 }
@@ -318,7 +318,7 @@ TEST(ImuSmoother, ImuThatStartsLate) {
   Play setup;
   setup.imu_there = [](double t) { return t > 3.0; };
   setup.duration = 40.0;
-  const Outcome run = play(setup);
+  const SmoothedRun run = play(setup);
   EXPECT_EQ(run.how, Initialisation::kInMotion);
   EXPECT_TRUE(run.levelled);
   EXPECT_LT(run.tilt_deg, 0.5);
@@ -342,7 +342,7 @@ TEST(ImuSmoother, LidarOutageOfASecond) {
   setup.spoil_match = [](double t, std::optional<LidarFactor>& match) {
     if (t > 15.0 && t < 16.0) match.reset();
   };
-  const Outcome run = play(setup);
+  const SmoothedRun run = play(setup);
   EXPECT_EQ(run.gated, 0);
   EXPECT_LT(run.position_rmse, 0.03);
 }
@@ -353,7 +353,7 @@ TEST(ImuSmoother, SwappedAxesAreFoundOut) {
     std::swap(sample.angular_rate.x(), sample.angular_rate.y());
     std::swap(sample.specific_force.x(), sample.specific_force.y());
   };
-  const Outcome run = play(setup);
+  const SmoothedRun run = play(setup);
   EXPECT_FALSE(run.trust.trusted);
   EXPECT_NE(run.trust.reason.find("x=+y y=+x z=+z"), std::string::npos) << run.trust.reason;
   // And the run goes on without it.
@@ -367,7 +367,7 @@ TEST(ImuSmoother, WrongExtrinsicsAreFoundOut) {
     sample.angular_rate = turn * sample.angular_rate;
     sample.specific_force = turn * sample.specific_force;
   };
-  const Outcome run = play(setup);
+  const SmoothedRun run = play(setup);
   EXPECT_FALSE(run.trust.trusted);
   EXPECT_NE(run.trust.reason.find("looks mounted about 4"), std::string::npos) << run.trust.reason;
   EXPECT_LT(run.last_position_error, 0.03);
@@ -376,7 +376,7 @@ TEST(ImuSmoother, WrongExtrinsicsAreFoundOut) {
 TEST(ImuSmoother, WrongUnitOfTheAccelerometerIsFoundOut) {
   Play setup;
   setup.spoil = [](double, ImuSample& sample) { sample.specific_force /= 9.81; };
-  const Outcome run = play(setup);
+  const SmoothedRun run = play(setup);
   EXPECT_FALSE(run.trust.trusted);
   EXPECT_LT(run.position_rmse, 0.02);
 }
@@ -394,7 +394,7 @@ TEST(ImuSmoother, ResumesBitForBit) {
           match->world_from_body =
               match->world_from_body * Pose(Eigen::Quaterniond::Identity(), {0.4, 0.0, 0.0});
       };
-      const Outcome whole = play(setup);
+      const SmoothedRun whole = play(setup);
       setup.save_at = at;
       EXPECT_EQ(play(setup).bytes, whole.bytes) << "saved at " << at;
     }
@@ -417,7 +417,7 @@ TEST(ImuSmoother, MemoryIsBounded) {
 TEST(ImuSmoother, BiasIsNotMistakenForWrongAxes) {
   Play setup;
   setup.carrier.gyro_bias = {0.03, -0.03, 0.03};
-  const Outcome run = play(setup);
+  const SmoothedRun run = play(setup);
   EXPECT_TRUE(run.trust.trusted) << run.trust.reason;
   EXPECT_LT(run.position_rmse, 0.0087);
 }

@@ -28,8 +28,8 @@ Stand make_stand(unsigned seed) {
   return stand;
 }
 
-StemView look(const Stand& stand, const Pose& world_from_body, int frame, std::mt19937& random,
-              double noise_m = 0.03) {
+StemView view_of_stand(const Stand& stand, const Pose& world_from_body, int frame,
+                       std::mt19937& random, double noise_m = 0.03) {
   std::normal_distribution<double> noise(0.0, noise_m);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   StemView view;
@@ -52,7 +52,7 @@ TEST(StemUp, LeansOfTreesAverageOut) {
   const Stand stand = make_stand(2);
   std::mt19937 random(3);
   const Pose pose(so3_exp({0.25, -0.1, 1.0}), {60.0, 0.0, 1.0});
-  const StemUp up = stem_up(look(stand, pose, 0, random), Eigen::Vector3d::UnitZ());
+  const StemUp up = stem_up(view_of_stand(stand, pose, 0, random), Eigen::Vector3d::UnitZ());
   const Eigen::Vector3d truth = pose.rotation().conjugate() * Eigen::Vector3d::UnitZ();
   EXPECT_LT(std::acos(up.up_in_body.dot(truth)), 1.0 * M_PI / 180.0);
   EXPECT_NEAR(up.spread_rad, 0.06, 0.02);
@@ -69,7 +69,7 @@ TEST(StemUp, AnyAxisOfTheBodyMayBeUp) {
     std::mt19937 random(3);
     const Pose pose(Eigen::Quaterniond::FromTwoVectors(up_in_body, Eigen::Vector3d::UnitZ()),
                     {60.0, 0.0, 1.0});
-    StemView view = look(stand, pose, 0, random);
+    StemView view = view_of_stand(stand, pose, 0, random);
     EXPECT_GT(up_of_axes(view).dot(up_in_body), std::cos(0.02)) << k;
     EXPECT_GT(stem_up(view, up_of_axes(view)).up_in_body.dot(up_in_body), std::cos(0.02)) << k;
     for (Stem& stem : view.stems)
@@ -122,7 +122,7 @@ TEST(SparseOdometry, FollowsATiltedSensorThroughLargeTurns) {
     for (int i = 0; i < 60; ++i) {
       const Pose truth(so3_exp({0.0, 0.0, i == 0 ? 0.0 : turn(random)}) * so3_exp({0.2, 0.1, 0.0}),
                        {2.0 * i, 0.3 * std::sin(i), 1.5});
-      const SparseStep step = odometry.add(look(stand, truth, i, random));
+      const SparseStep step = odometry.add(view_of_stand(stand, truth, i, random));
       if (i == 0) {
         EXPECT_EQ(step.status, SparseStepStatus::kFirst);
         first_truth = truth;
@@ -149,10 +149,11 @@ TEST(SparseOdometry, StemsThatScatterAreAveraged) {
     SparseOdometry odometry({});
     Pose found;
     for (int i = 0; i <= 120; ++i)
-      found = odometry
-                  .add(look(stand, Pose(Eigen::Quaterniond::Identity(), {1.0 * i, 0.0, 1.5}), i,
-                            random, 0.2))
-                  .world_from_body;
+      found =
+          odometry
+              .add(view_of_stand(stand, Pose(Eigen::Quaterniond::Identity(), {1.0 * i, 0.0, 1.5}),
+                                 i, random, 0.2))
+              .world_from_body;
     squares += (found.translation().head<2>() - Eigen::Vector2d(120.0, 0.0)).squaredNorm();
   }
   EXPECT_LT(std::sqrt(squares / 16.0), 0.38);
@@ -162,11 +163,12 @@ TEST(SparseOdometry, AnEmptyViewIsUnmatchedAndKeepsThePose) {
   const Stand stand = make_stand(6);
   std::mt19937 random(7);
   SparseOdometry odometry({});
-  (void)odometry.add(look(stand, Pose(), 0, random));
+  (void)odometry.add(view_of_stand(stand, Pose(), 0, random));
   StemView empty;
   empty.frame = 1;
   EXPECT_EQ(odometry.add(empty).status, SparseStepStatus::kUnmatched);
-  EXPECT_NE(odometry.add(look(stand, Pose(), 2, random)).status, SparseStepStatus::kUnmatched);
+  EXPECT_NE(odometry.add(view_of_stand(stand, Pose(), 2, random)).status,
+            SparseStepStatus::kUnmatched);
 }
 
 // A cabin 3 m above the feet goes straight on and looks ahead. Feet look higher the farther they
@@ -180,7 +182,7 @@ TEST(SparseOdometry, HoldingTheTiltCostsNoWay) {
   Pose last;
   for (int i = 0; i <= 200; ++i) {
     StemView view =
-        look(stand, Pose(Eigen::Quaterniond::Identity(), {0.4 * i, 0.0, 3.0}), i, random);
+        view_of_stand(stand, Pose(Eigen::Quaterniond::Identity(), {0.4 * i, 0.0, 3.0}), i, random);
     std::erase_if(view.stems, [](const Stem& stem) { return stem.point.x() < 0.0F; });
     for (Stem& stem : view.stems)
       stem.point.z() += 0.0008F * stem.point.x() * stem.point.x();

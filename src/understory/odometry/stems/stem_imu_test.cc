@@ -35,7 +35,7 @@ struct Swing {
   }
 };
 
-Scan scan_at(double t) {
+Scan two_point_scan(double t) {
   Scan scan;
   scan.stamp = from_seconds(t);
   scan.points.resize(2);
@@ -56,7 +56,7 @@ TEST(StemImu, TellsTurnsUpAndItsOwnBias) {
     const double t = 0.2 * k;
     for (int i = 0; i < 40; ++i)
       samples.add(swing.at(t + 0.005 * i));
-    const Scan scan = scan_at(t + 0.1);
+    const Scan scan = two_point_scan(t + 0.1);
     if (k == 0) continue;
     const auto motion = imu.motion(samples, from_seconds(t - 0.1), scan, swing.body_from_imu);
     ASSERT_TRUE(motion);
@@ -87,7 +87,8 @@ TEST(StemImu, TellsTurnsUpAndItsOwnBias) {
   EXPECT_LT(last.sd_rad, 0.3 * kDegree);
   EXPECT_GT(last.sd_rad, 0.1 * kDegree);
   // Samples that do not reach are no motion.
-  EXPECT_FALSE(imu.motion(samples, from_seconds(300.0), scan_at(300.2), swing.body_from_imu));
+  EXPECT_FALSE(
+      imu.motion(samples, from_seconds(300.0), two_point_scan(300.2), swing.body_from_imu));
   // After a pause up is not known as well as before.
   imu.forget();
   StemImu::Motion still;

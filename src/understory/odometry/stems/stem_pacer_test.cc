@@ -13,14 +13,14 @@
 namespace understory {
 namespace {
 
-constexpr double kPeriod = 0.2;
+constexpr double kFramePeriodS = 0.2;
 
 struct Trunk {
   Eigen::Vector2d foot;
   double radius = 0.15;
 };
 
-std::vector<Trunk> stand(double min_spacing_m) {
+std::vector<Trunk> spaced_trunks(double min_spacing_m) {
   Random random(7);
   std::vector<Trunk> trunks;
   for (int tried = 0; tried < 4000; ++tried) {
@@ -37,10 +37,10 @@ std::vector<Trunk> stand(double min_spacing_m) {
 
 // An upright sensor 2 m above level ground, heading `yaw` at (x, 0): one frame of 16 rings, with
 // noise, taken at one moment.
-ScanPtr look(const std::vector<Trunk>& trunks, double x, double yaw, int frame) {
+ScanPtr frame_of_trunks(const std::vector<Trunk>& trunks, double x, double yaw, int frame) {
   Random random(11, static_cast<std::uint64_t>(frame));
   auto scan = std::make_shared<Scan>();
-  scan->stamp = static_cast<TimeNs>(frame * kPeriod * 1e9);
+  scan->stamp = static_cast<TimeNs>(frame * kFramePeriodS * 1e9);
   scan->has_point_times = false;
   scan->ring_count = 16;
   for (int k = 0; k < 900; ++k) {
@@ -76,22 +76,22 @@ double place_at(int frame) {
   return frame < 42 ? 0.0 : 0.15 * (frame - 42 + 1);
 }
 
-struct Outcome {
+struct PacedScans {
   std::vector<StemScan> scans;
   std::size_t max_in_memory = 0;
   std::size_t max_stems = 0;
 };
 
-Outcome run(const StemPaceConfig& pace, const StemFrontEndConfig& config, int frames,
-            const Rig& rig = {}) {
-  const std::vector<Trunk> trunks = stand(2.5);
+PacedScans run(const StemPaceConfig& pace, const StemFrontEndConfig& config, int frames,
+               const Rig& rig = {}) {
+  const std::vector<Trunk> trunks = spaced_trunks(2.5);
   StemPacer pacer(pace, config);
-  Outcome outcome;
+  PacedScans outcome;
   const auto take = [&](std::vector<StemScan> scans) {
     std::move(scans.begin(), scans.end(), std::back_inserter(outcome.scans));
   };
   for (int frame = 0; frame < frames; ++frame) {
-    take(pacer.add(look(trunks, place_at(frame), 0.0, frame), rig));
+    take(pacer.add(frame_of_trunks(trunks, place_at(frame), 0.0, frame), rig));
     outcome.max_in_memory = std::max(outcome.max_in_memory, pacer.scans_in_memory());
   }
   take(pacer.finish(rig));
@@ -102,13 +102,13 @@ TEST(StemPacer, PositionsFewScansOfAStandingMachineAndAllOfAStart) {
   constexpr int kFrames = 80;
   StemPaceConfig pace;
   pace.longest_gap_s = 1.0;
-  const Outcome outcome = run(pace, {}, kFrames);
+  const PacedScans outcome = run(pace, {}, kFrames);
   ASSERT_EQ(outcome.scans.size(), static_cast<std::size_t>(kFrames));
   int positioned_standing = 0;
   for (int frame = 0; frame < kFrames; ++frame) {
     const StemScan& scan = outcome.scans[static_cast<std::size_t>(frame)];
     EXPECT_EQ(scan.view.frame, frame);
-    EXPECT_EQ(scan.view.stamp, static_cast<TimeNs>(frame * kPeriod * 1e9));
+    EXPECT_EQ(scan.view.stamp, static_cast<TimeNs>(frame * kFramePeriodS * 1e9));
     positioned_standing += frame < 36 && scan.positioned ? 1 : 0;
     // Up comes from the stems alone: a hundredth of a degree of lean is a matter of noise.
     const Eigen::Vector3d at = scan.step.world_from_body.translation();
@@ -127,13 +127,13 @@ TEST(StemPacer, PositionsFewScansOfAStandingMachineAndAllOfAStart) {
 // and the world stands upright. Up was once taken from the z axis of the body.
 TEST(StemPacer, AxesOfTheBodyMayPointAnywhere) {
   constexpr int kFrames = 50;
-  const Outcome upright = run({}, {}, kFrames);
+  const PacedScans upright = run({}, {}, kFrames);
   for (const Eigen::Vector3d& about :
        {Eigen::Vector3d(M_PI, 0.0, 0.0), Eigen::Vector3d(0.0, 0.5 * M_PI, 0.0),
         Eigen::Vector3d(-0.5 * M_PI, 0.0, 0.0)}) {
     Rig rig;
     rig.body_from_lidar = Pose(so3_exp(about), Eigen::Vector3d::Zero());
-    const Outcome turned = run({}, {}, kFrames, rig);
+    const PacedScans turned = run({}, {}, kFrames, rig);
     ASSERT_EQ(turned.scans.size(), upright.scans.size());
     for (std::size_t i = 0; i < turned.scans.size(); ++i) {
       const StemScan& scan = turned.scans[i];
@@ -151,13 +151,14 @@ TEST(StemPacer, AxesOfTheBodyMayPointAnywhere) {
 TEST(StemPacer, WithoutAGapItIsTheFrontEnd) {
   StemPaceConfig pace;
   pace.longest_gap_s = 0.0;
-  const Outcome outcome = run(pace, {}, 12);
+  const PacedScans outcome = run(pace, {}, 12);
   ASSERT_EQ(outcome.scans.size(), 12U);
   EXPECT_EQ(outcome.max_in_memory, 0U);
   StemFrontEnd front_end({});
-  const std::vector<Trunk> trunks = stand(2.5);
+  const std::vector<Trunk> trunks = spaced_trunks(2.5);
   for (int frame = 0; frame < 12; ++frame) {
-    const StemScan alone = front_end.add(*look(trunks, place_at(frame), 0.0, frame), frame, Rig());
+    const StemScan alone =
+        front_end.add(*frame_of_trunks(trunks, place_at(frame), 0.0, frame), frame, Rig());
     const StemScan& paced = outcome.scans[static_cast<std::size_t>(frame)];
     EXPECT_TRUE(paced.positioned);
     EXPECT_EQ(paced.step.world_from_body.translation(), alone.step.world_from_body.translation());
@@ -166,14 +167,16 @@ TEST(StemPacer, WithoutAGapItIsTheFrontEnd) {
 
 // Views of a drive of 12 m.
 int views_kept(const ViewChoiceConfig& keep, double spacing_m, double step_m, double turn) {
-  const std::vector<Trunk> trunks = stand(spacing_m);
+  const std::vector<Trunk> trunks = spaced_trunks(spacing_m);
   StemFrontEndConfig config;
   config.keep = keep;
   StemFrontEnd front_end(config);
   int kept = 0;
   std::size_t max_stems = 0;
   for (int frame = 0; frame * step_m < 12.0 && frame < 60; ++frame) {
-    kept += front_end.add(*look(trunks, frame * step_m, turn * frame, frame), frame, Rig()).keep;
+    kept +=
+        front_end.add(*frame_of_trunks(trunks, frame * step_m, turn * frame, frame), frame, Rig())
+            .keep;
     max_stems = std::max(max_stems, front_end.odometry().stems_in_memory());
   }
   EXPECT_LT(max_stems, 2 * trunks.size());

@@ -5,8 +5,12 @@
 
 #include <string>
 
+#include "understory/output/report/test_count.h"
+
 namespace understory {
 namespace {
+
+using test::count_of;
 
 ReportInput run_with_loops(int closed, int rejected, std::size_t not_listed) {
   ReportInput input;
@@ -18,13 +22,6 @@ ReportInput run_with_loops(int closed, int rejected, std::size_t not_listed) {
     input.loops.push_back(loop);
   }
   return input;
-}
-
-std::size_t count_of(const std::string& text, const std::string& part) {
-  std::size_t count = 0;
-  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
-    ++count;
-  return count;
 }
 
 // "24 of 24 tried loops" stood over a run with 252 candidates that were not accepted.

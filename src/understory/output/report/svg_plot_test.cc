@@ -6,15 +6,12 @@
 #include <cmath>
 #include <limits>
 
+#include "understory/output/report/test_count.h"
+
 namespace understory {
 namespace {
 
-std::size_t count_of(const std::string& text, const std::string& part) {
-  std::size_t count = 0;
-  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
-    ++count;
-  return count;
-}
+using test::count_of;
 
 TEST(SvgPlot, AxesHaveTheirLabelsAndTicks) {
   Plot plot;

@@ -29,7 +29,7 @@ double trees(double x) {
   return 10.0 + 0.2 * x;
 }
 
-Raster raster_of(bool ground) {
+Raster layer_raster(bool ground) {
   Raster raster;
   raster.x0 = -20.0;
   raster.y0 = -10.0;
@@ -68,8 +68,8 @@ TEST(MovedLayers, CloudAndRastersGoWithThePath) {
     }
     writer.commit();
   }
-  write_geotiff(folders.run / "dtm.tif", raster_of(true), "");
-  write_geotiff(folders.run / "chm.tif", raster_of(false), "");
+  write_geotiff(folders.run / "dtm.tif", layer_raster(true), "");
+  write_geotiff(folders.run / "chm.tif", layer_raster(false), "");
 
   const Pose motion(so3_exp(Vector3d(0.0, 0.0, 1.1)) * so3_exp(Vector3d(0.05, -0.03, 0.0)),
                     Vector3d(300.0, -200.0, 120.0));

@@ -22,7 +22,7 @@ LayerFrame frame_of(const std::string& system) {
              : LayerFrame(enu_from_world, system == kInFeet ? in_california : in_finland, system);
 }
 
-class MapGrid : public testing::TestWithParam<std::string> {};
+class MapGrid : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(MapGrid, AFileInAnyFrameGivesItsPlacesBack) {
   const LayerFrame layers = frame_of(GetParam());
@@ -41,7 +41,7 @@ TEST_P(MapGrid, AFileInAnyFrameGivesItsPlacesBack) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Frames, MapGrid, testing::Values("", "EPSG:3067", "EPSG:4979", kInFeet));
+INSTANTIATE_TEST_SUITE_P(Frames, MapGrid, ::testing::Values("", "EPSG:3067", "EPSG:4979", kInFeet));
 
 }  // namespace
 }  // namespace understory

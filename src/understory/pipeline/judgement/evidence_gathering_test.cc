@@ -12,9 +12,9 @@ namespace understory {
 namespace {
 
 // A recording that has been read: what its topics hold is given.
-class ReadRecording : public Recording {
+class TopicsRecording : public Recording {
  public:
-  explicit ReadRecording(std::vector<TopicReport> topics) : topics_(std::move(topics)) {}
+  explicit TopicsRecording(std::vector<TopicReport> topics) : topics_(std::move(topics)) {}
 
   std::optional<Event> next() override { return std::nullopt; }
   const Rig& rig() const override { return rig_; }
@@ -37,7 +37,7 @@ TopicReport topic(const std::string& role, double first_s, double last_s) {
 }
 
 // Of a recording that was read to its end; what it points to has to live as long.
-ReadingFacts facts_of(const ReadRecording& recording, const EventOrderer::Report& repair,
+ReadingFacts facts_of(const TopicsRecording& recording, const EventOrderer::Report& repair,
                       const Log& log) {
   ReadingFacts facts;
   facts.source = &recording;
@@ -48,8 +48,8 @@ ReadingFacts facts_of(const ReadRecording& recording, const EventOrderer::Report
 }
 
 // A lidar from 100 s to 160 s, and an IMU whose stamps lie between these.
-RunEvidence gathered(double imu_first_s, double imu_last_s, double imu_offset_s) {
-  const ReadRecording recording(
+RunEvidence gathered_reading(double imu_first_s, double imu_last_s, double imu_offset_s) {
+  const TopicsRecording recording(
       {topic("lidar", 100.0, 160.0), topic("imu", imu_first_s, imu_last_s)});
   EventOrderer::Report repair;
   repair.streams[EventOrderer::kImu].offset = from_seconds(imu_offset_s);
@@ -61,25 +61,25 @@ RunEvidence gathered(double imu_first_s, double imu_last_s, double imu_offset_s)
 }
 
 TEST(EvidenceGathering, AnImuThatBeginsLateOrStops) {
-  const std::string why = gathered(104.0, 155.0, 0.0).imu.unused_why;
+  const std::string why = gathered_reading(104.0, 155.0, 0.0).imu.unused_why;
   EXPECT_NE(why.find("it begins 4.0 s after the lidar"), std::string::npos) << why;
   EXPECT_NE(why.find("it stops 5.0 s before the lidar"), std::string::npos) << why;
 }
 
 // A regression: the stamps were compared before their clock was mended.
 TEST(EvidenceGathering, AClockThatWasMendedIsNoLateImu) {
-  const std::string ahead = gathered(103.0, 163.0, -3.0).imu.unused_why;
+  const std::string ahead = gathered_reading(103.0, 163.0, -3.0).imu.unused_why;
   EXPECT_EQ(ahead, "its samples came after their scans were processed");
-  const std::string behind = gathered(97.0, 157.0, 3.0).imu.unused_why;
+  const std::string behind = gathered_reading(97.0, 157.0, 3.0).imu.unused_why;
   EXPECT_EQ(behind, "its samples came after their scans were processed");
-  const std::string late = gathered(100.0, 156.0, 4.0).imu.unused_why;
+  const std::string late = gathered_reading(100.0, 156.0, 4.0).imu.unused_why;
   EXPECT_EQ(late, "it begins 4.0 s after the lidar");
 }
 
 // A regression: samples in degrees per second were dropped with a warning, and the run was
 // complete.
 TEST(EvidenceGathering, SamplesThatCannotBeUsedHaveNoSay) {
-  const ReadRecording recording({topic("lidar", 100.0, 160.0), topic("imu", 100.0, 160.0)});
+  const TopicsRecording recording({topic("lidar", 100.0, 160.0), topic("imu", 100.0, 160.0)});
   const EventOrderer::Report repair;
   const Log log;
   ReadingFacts facts = facts_of(recording, repair, log);
@@ -105,7 +105,7 @@ TEST(EvidenceGathering, WhatTheReadersCouldNotUse) {
   TopicReport fixes = topic("gnss", 0.0, 0.0);
   fixes.messages = 0;  // rows of a table of which none can be read
   fixes.unreadable = 5;
-  const ReadRecording recording({topic("lidar", 100.0, 160.0), imu, fixes});
+  const TopicsRecording recording({topic("lidar", 100.0, 160.0), imu, fixes});
   const EventOrderer::Report repair;
   const Log log;
   RunEvidence evidence;
@@ -127,7 +127,7 @@ TEST(EvidenceGathering, AnImuTooSlowToGoBy) {
 }
 
 TEST(EvidenceGathering, WhoWentOnAfterWhom) {
-  const ReadRecording recording({topic("lidar", 100.0, 160.0)});
+  const TopicsRecording recording({topic("lidar", 100.0, 160.0)});
   EventOrderer::Report repair;
   // Before the epoch of the clock: a sensor that is not there does not outlast them.
   const double ends_s[] = {-3.0, -1.0, 0.0};
@@ -145,14 +145,14 @@ TEST(EvidenceGathering, WhoWentOnAfterWhom) {
   EXPECT_DOUBLE_EQ(evidence.mag.silent_at_end_s, 0.0);  // there is none
   TopicReport log_beside = topic("gnss", 90.0, 1000.0);
   log_beside.beside = true;
-  const ReadRecording folder({topic("lidar", 100.0, 160.0), log_beside});
+  const TopicsRecording folder({topic("lidar", 100.0, 160.0), log_beside});
   RunEvidence of_folder;
   gather_reading(facts_of(folder, repair, log), of_folder);
   EXPECT_EQ(of_folder.lidar.outlived_by, "IMU");
 }
 
 TEST(EvidenceGathering, FindingsOfTheReaders) {
-  const ReadRecording recording({topic("lidar", 100.0, 160.0)});
+  const TopicsRecording recording({topic("lidar", 100.0, 160.0)});
   const EventOrderer::Report repair;
   Log log;
   report_finding(log, Finding::kDamage, "at byte 5");

@@ -12,7 +12,8 @@ namespace understory {
 namespace {
 
 // 10 Hz over 20 s; `at` gives x, y and yaw at a time.
-MotionEvidence gathered(const std::function<Eigen::Vector3d(double)>& at, double faster = 1.0) {
+MotionEvidence gathered_motion(const std::function<Eigen::Vector3d(double)>& at,
+                               double faster = 1.0) {
   PathEvidence path{MotionLimits()};
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d place = at(0.1 * i * faster);
@@ -31,7 +32,7 @@ std::function<Eigen::Vector3d(double)> circle(double speed) {
 }
 
 TEST(PathEvidence, KnowsSpeedAccelerationAndTurnRate) {
-  const MotionEvidence motion = gathered(circle(2.0));
+  const MotionEvidence motion = gathered_motion(circle(2.0));
   EXPECT_EQ(motion.steps, 199U);
   EXPECT_NEAR(motion.speed_p99_m_s, 2.0, 0.01);
   EXPECT_NEAR(motion.acceleration_p95_m_s2, 4.0 / 5.0, 0.01);
@@ -44,15 +45,15 @@ TEST(PathEvidence, KnowsSpeedAccelerationAndTurnRate) {
 // Clouds two seconds apart that are taken to be a tenth of a second apart.
 TEST(PathEvidence, AWalkPlayedTwentyTimesTooFastIsImpossible) {
   const auto walk = [](double t) { return Eigen::Vector3d(t, 0.5 * std::sin(0.8 * t), 0.0); };
-  EXPECT_EQ(gathered(walk).impossible, 0U);
-  EXPECT_GT(gathered(walk, 20.0).impossible, 100U);
+  EXPECT_EQ(gathered_motion(walk).impossible, 0U);
+  EXPECT_GT(gathered_motion(walk, 20.0).impossible, 100U);
 }
 
 TEST(PathEvidence, NoiseOfMatchingIsNoAcceleration) {
   const auto noisy = [](double t) {
     return Eigen::Vector3d(t + (std::lround(10.0 * t) % 2 == 0 ? 0.04 : -0.04), 0.0, 0.0);
   };
-  EXPECT_EQ(gathered(noisy).impossible, 0U);
+  EXPECT_EQ(gathered_motion(noisy).impossible, 0U);
 }
 
 // Walks at 4 m/s, and slides by 10 m within a second.
@@ -61,7 +62,7 @@ TEST(PathEvidence, APathThatSlidesAwayHasJumped) {
     const double slide = 10.0 * std::clamp(t - 8.0, 0.0, 1.0);
     return Eigen::Vector3d(4.0 * t + slide, 0.4 * std::sin(90.0 * slide), 0.0);
   };
-  const MotionEvidence motion = gathered(slides);
+  const MotionEvidence motion = gathered_motion(slides);
   EXPECT_GT(motion.impossible, 2U);
   EXPECT_NEAR(motion.jump_m, 10.0, 1.5);
   EXPECT_NEAR(to_seconds(motion.jump_stamp), 9.0, 0.3);
@@ -73,7 +74,7 @@ TEST(PathEvidence, ScansAtWrongPlacesComeBackAndAreNoJump) {
     return Eigen::Vector3d(4.0 * t + (scan == 60 || scan == 62 || scan == 120 ? 1.7 : 0.0), 0.0,
                            0.0);
   };
-  const MotionEvidence motion = gathered(strays);
+  const MotionEvidence motion = gathered_motion(strays);
   EXPECT_GT(motion.impossible, 5U);
   EXPECT_LT(motion.jump_m, 0.3);
 }

@@ -15,7 +15,7 @@
 namespace understory {
 namespace {
 
-class InputIdentityTest : public testing::Test {
+class InputIdentityTest : public ::testing::Test {
  protected:
   std::string file(const std::string& name, const std::string& content) const {
     const std::filesystem::path path = folder_ / name;

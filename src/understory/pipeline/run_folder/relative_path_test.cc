@@ -37,7 +37,7 @@ Trajectory turned_scans(int count) {
   return scans;
 }
 
-class RelativePathTest : public testing::Test {
+class RelativePathTest : public ::testing::Test {
  protected:
   const test::TemporaryFolder folder_;
   const fs::path path_ = folder_ / "imu_path.bin";

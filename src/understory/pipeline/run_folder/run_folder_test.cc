@@ -41,7 +41,7 @@ std::map<std::string, std::string> snapshot(const fs::path& folder) {
   return content;
 }
 
-class RunFolders : public testing::Test {
+class RunFolders : public ::testing::Test {
  protected:
   // A command that writes these files and run.json.
   void run(const std::map<std::string, std::string>& files, bool overwrite = false,

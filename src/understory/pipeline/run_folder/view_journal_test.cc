@@ -49,7 +49,7 @@ void tell(ViewSink& sink, int round) {
   sink.on_fix(fix);
 }
 
-class ViewJournalTest : public testing::Test {
+class ViewJournalTest : public ::testing::Test {
  protected:
   const test::TemporaryFolder folder_;
   const fs::path path_ = folder_ / "views.bin";

@@ -12,7 +12,12 @@
 namespace understory {
 namespace {
 
-using namespace test;
+using test::all_warnings;
+using test::count_of;
+using test::read_all;
+using test::read_bytes;
+using test::TemporaryFolder;
+using test::write_bytes;
 
 // Small bags that the Python package rosbags wrote: 3 clouds of 20 points, 15 IMU samples, a fix
 // and /tf_static.

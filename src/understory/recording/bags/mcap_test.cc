@@ -9,20 +9,25 @@
 namespace understory {
 namespace {
 
-using namespace test;
+using test::all_warnings;
+using test::count_of;
+using test::Drive;
+using test::expect_same;
+using test::kStart;
+using test::make_drive;
+using test::make_scan;
+using test::read_all;
+using test::read_bytes;
+using test::small_chunks;
+using test::TemporaryFolder;
+using test::write_bytes;
+using test::write_drive;
 
 class McapCompressions : public ::testing::TestWithParam<McapCompression> {};
 
 INSTANTIATE_TEST_SUITE_P(All, McapCompressions,
                          ::testing::Values(McapCompression::kNone, McapCompression::kLz4,
                                            McapCompression::kZstd));
-
-McapWriterOptions small_chunks(McapCompression compression) {
-  McapWriterOptions options;
-  options.compression = compression;
-  options.chunk_size_bytes = 20'000;
-  return options;
-}
 
 TEST_P(McapCompressions, GivesBackWhatWasWritten) {
   const TemporaryFolder folder;

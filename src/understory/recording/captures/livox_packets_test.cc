@@ -109,14 +109,14 @@ struct AviaPacket {
   }
 };
 
-void add(LivoxDecoder& decoder, const Bytes& bytes, TimeNs stamp = kTime) {
+void add_livox(LivoxDecoder& decoder, const Bytes& bytes, TimeNs stamp = kTime) {
   decoder.add_packet(bytes.data(), bytes.size(), stamp);
 }
 
-ScanPtr decode_alone(const Bytes& bytes) {
+ScanPtr decode_livox_alone(const Bytes& bytes) {
   Log log;
   LivoxDecoder decoder({}, "test", log);
-  add(decoder, bytes);
+  add_livox(decoder, bytes);
   decoder.finish();
   EXPECT_TRUE(log.warnings().empty()) << test::all_warnings(log);
   return decoder.take_scan();
@@ -125,7 +125,7 @@ ScanPtr decode_alone(const Bytes& bytes) {
 TEST(LivoxPackets, ReadsAllTypesOfAMid360) {
   Mid360Packet packet;
   EXPECT_EQ(packet.bytes().size(), 1380U);  // as the sensor sends them
-  const ScanPtr fine = decode_alone(packet.bytes());
+  const ScanPtr fine = decode_livox_alone(packet.bytes());
   ASSERT_EQ(fine->points.size(), 96U);
   const ScanPoint& point = fine->points[5];
   EXPECT_FLOAT_EQ(point.x, 1.005F);
@@ -139,9 +139,9 @@ TEST(LivoxPackets, ReadsAllTypesOfAMid360) {
   EXPECT_EQ(fine->stamp, kTime);
   EXPECT_EQ(fine->ring_count, 0);
   packet.type = 2;
-  EXPECT_FLOAT_EQ(decode_alone(packet.bytes())->points[7].x, 1.07F);
+  EXPECT_FLOAT_EQ(decode_livox_alone(packet.bytes())->points[7].x, 1.07F);
   packet.type = 3;
-  const ScanPoint round = decode_alone(packet.bytes())->points[0];
+  const ScanPoint round = decode_livox_alone(packet.bytes())->points[0];
   EXPECT_NEAR(round.x, 0.0, 1e-6);
   EXPECT_NEAR(round.y, 2.0 * std::sin(std::numbers::pi / 3.0), 1e-6);
   EXPECT_NEAR(round.z, 1.0, 1e-6);
@@ -175,7 +175,7 @@ TEST(LivoxPackets, ReadsTheTypesOfAnAvia) {
   for (const int type : {2, 3, 4, 5, 7, 8}) {
     AviaPacket packet;
     packet.type = static_cast<std::uint8_t>(type);
-    const ScanPtr scan = decode_alone(packet.bytes());
+    const ScanPtr scan = decode_livox_alone(packet.bytes());
     const std::size_t returns = type < 4 ? 1 : type < 6 ? 2 : 3;
     const std::size_t firings = type < 4 ? 96 : type < 6 ? 48 : 30;
     ASSERT_EQ(scan->points.size(), returns * firings) << type;
@@ -190,7 +190,7 @@ TEST(LivoxPackets, ReadsTheTypesOfAnAvia) {
   }
   AviaPacket utc;
   utc.utc = true;
-  EXPECT_EQ(decode_alone(utc.bytes())->stamp, kTime);
+  EXPECT_EQ(decode_livox_alone(utc.bytes())->stamp, kTime);
 }
 
 // Protocol 1 does not state the interval: the next packet tells it.
@@ -200,7 +200,7 @@ TEST(LivoxPackets, SpreadsPointsOfAnAviaUntilTheNextPacket) {
   for (int i = 0; i < 3; ++i) {
     AviaPacket packet;
     packet.time = kTime + i * 960'000;
-    add(decoder, packet.bytes(), packet.time);
+    add_livox(decoder, packet.bytes(), packet.time);
   }
   decoder.finish();
   const ScanPtr scan = decoder.take_scan();
@@ -216,7 +216,7 @@ TEST(LivoxPackets, ScansLastATenthOfASecond) {
     Mid360Packet packet;
     packet.time = kTime + i * kPacket;
     packet.counter = static_cast<std::uint16_t>(i);
-    add(decoder, packet.bytes(), packet.time);
+    add_livox(decoder, packet.bytes(), packet.time);
   }
   decoder.finish();
   std::vector<std::size_t> points;
@@ -233,12 +233,12 @@ TEST(LivoxPackets, NamesPacketsThatAreCutDoubledOrMissing) {
     Mid360Packet packet;
     packet.time = kTime + i * kPacket;
     packet.counter = static_cast<std::uint16_t>(i);
-    add(decoder, packet.bytes(), packet.time);
+    add_livox(decoder, packet.bytes(), packet.time);
   }
   Bytes cut = Mid360Packet().bytes();
   cut.resize(700);
-  add(decoder, cut);
-  add(decoder, {});
+  add_livox(decoder, cut);
+  add_livox(decoder, {});
   decoder.finish();
   EXPECT_EQ(decoder.take_scan()->points.size(), 5U * 96U);
   EXPECT_EQ(test::count_of(log, "recording.damaged_packet"), 4U) << test::all_warnings(log);
@@ -258,8 +258,8 @@ TEST(LivoxPackets, GoOnWhereTheyWereSaved) {
       BinaryReader reader(writer.bytes(), "test");
       second.load(reader);
     }
-    add(whole, packet.bytes(), packet.time);
-    add(i < 70 ? first : second, packet.bytes(), packet.time);
+    add_livox(whole, packet.bytes(), packet.time);
+    add_livox(i < 70 ? first : second, packet.bytes(), packet.time);
   }
   whole.finish();
   second.finish();

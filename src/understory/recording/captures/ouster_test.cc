@@ -7,15 +7,15 @@
 
 #include "understory/recording/captures/packet_test_support.h"
 #include "understory/recording/recording_test_support.h"
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 
 namespace understory {
 namespace {
 
 using test::Bytes;
+using test::drain;
 using test::put;
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 OusterMetadata small_sensor(OusterProfile profile) {
   OusterMetadata metadata;
@@ -81,16 +81,8 @@ Bytes make_ouster(const OusterMetadata& metadata, std::uint16_t frame, std::uint
   return bytes;
 }
 
-void add(OusterDecoder& decoder, const Bytes& bytes) {
+void add_ouster(OusterDecoder& decoder, const Bytes& bytes) {
   decoder.add_lidar_packet(bytes.data(), bytes.size());
-}
-
-std::vector<ScanPtr> drain(OusterDecoder& decoder) {
-  decoder.finish();
-  std::vector<ScanPtr> scans;
-  while (ScanPtr scan = decoder.take_scan())
-    scans.push_back(scan);
-  return scans;
 }
 
 // A stream that begins within a turn, over the whole turn and over a window of 8 columns.
@@ -103,9 +95,10 @@ TEST(Ouster, LeavesOutAFirstScanThatIsAPart) {
       OusterDecoder decoder(metadata, "test", log);
       for (int frame = 0; frame < 3; ++frame) {
         for (int column = frame == 0 ? first : 0; column < window; column += 4) {
-          add(decoder, make_ouster(metadata, static_cast<std::uint16_t>(frame),
-                                   static_cast<std::uint16_t>(column),
-                                   5'000'000'000 + frame * 100'000'000LL + column * 100'000LL));
+          add_ouster(decoder,
+                     make_ouster(metadata, static_cast<std::uint16_t>(frame),
+                                 static_cast<std::uint16_t>(column),
+                                 5'000'000'000 + frame * 100'000'000LL + column * 100'000LL));
         }
       }
       EXPECT_EQ(drain(decoder).size(), first == 0 ? 3U : 2U) << window;
@@ -124,7 +117,7 @@ TEST_P(OusterProfiles, GivesThePointsOfTheManual) {
   OusterDecoder decoder(metadata, "test", log);
   const Bytes bytes = make_ouster(metadata, 7, 4, 5'000'000'000);
   ASSERT_EQ(bytes.size(), metadata.lidar_packet_size());
-  add(decoder, bytes);
+  add_ouster(decoder, bytes);
   const auto scans = drain(decoder);
   ASSERT_EQ(scans.size(), 1U);
   const Scan& scan = *scans[0];
@@ -138,12 +131,12 @@ TEST_P(OusterProfiles, GivesThePointsOfTheManual) {
   EXPECT_EQ(point.ring, 0);
   EXPECT_EQ(point.intensity, 77.0F);
   const double encoder = -2.0 * std::numbers::pi * 6.0 / 16.0;
-  const double direction = encoder + 4.0 * kRadPerDeg;
+  const double direction = encoder + 4.0 * kDegree;
   const double range = 4.0 - 0.015;
   const Eigen::Vector3d in_lidar(
-      range * std::cos(5.0 * kRadPerDeg) * std::cos(direction) + 0.015 * std::cos(encoder),
-      range * std::cos(5.0 * kRadPerDeg) * std::sin(direction) + 0.015 * std::sin(encoder),
-      -range * std::sin(5.0 * kRadPerDeg));
+      range * std::cos(5.0 * kDegree) * std::cos(direction) + 0.015 * std::cos(encoder),
+      range * std::cos(5.0 * kDegree) * std::sin(direction) + 0.015 * std::sin(encoder),
+      -range * std::sin(5.0 * kDegree));
   EXPECT_NEAR(point.x, -in_lidar.x(), 1e-5);
   EXPECT_NEAR(point.y, -in_lidar.y(), 1e-5);
   EXPECT_NEAR(point.z, in_lidar.z() + 0.036, 1e-5);
@@ -167,7 +160,7 @@ TEST(Ouster, SplitsFramesAndDropsDoubledPackets) {
   TimeNs time = 1'000'000'000;
   for (const std::uint16_t frame : {65535, 0, 1}) {
     for (const std::uint16_t first : {0, 4, 4, 8, 12}) {
-      add(decoder, make_ouster(metadata, frame, first, time + first * 100'000));
+      add_ouster(decoder, make_ouster(metadata, frame, first, time + first * 100'000));
     }
     time += 100'000'000;
   }
@@ -182,13 +175,13 @@ TEST(Ouster, GoesOnBehindAGapAndPassesOverDamage) {
   const OusterMetadata metadata = small_sensor(OusterProfile::kLegacy);
   Log log;
   OusterDecoder decoder(metadata, "test", log);
-  add(decoder, make_ouster(metadata, 5, 0, 1'000'000'000));
-  add(decoder, make_ouster(metadata, 999, 4, 1'000'400'000));  // flipped frame
-  add(decoder, make_ouster(metadata, 5, 8, 900'000'000'000));  // flipped time
-  add(decoder, make_ouster(metadata, 5, 12, 1'001'200'000));
+  add_ouster(decoder, make_ouster(metadata, 5, 0, 1'000'000'000));
+  add_ouster(decoder, make_ouster(metadata, 999, 4, 1'000'400'000));  // flipped frame
+  add_ouster(decoder, make_ouster(metadata, 5, 8, 900'000'000'000));  // flipped time
+  add_ouster(decoder, make_ouster(metadata, 5, 12, 1'001'200'000));
   decoder.add_lidar_packet(make_ouster(metadata, 5, 12, 1).data(), 17);  // cut short
-  add(decoder, make_ouster(metadata, 105, 0, 11'000'000'000));           // 10 s later
-  add(decoder, make_ouster(metadata, 105, 4, 11'000'400'000));
+  add_ouster(decoder, make_ouster(metadata, 105, 0, 11'000'000'000));    // 10 s later
+  add_ouster(decoder, make_ouster(metadata, 105, 4, 11'000'400'000));
   const auto scans = drain(decoder);
   ASSERT_EQ(scans.size(), 2U);
   EXPECT_EQ(scans[0]->points.size(), 16U);
@@ -201,7 +194,7 @@ TEST(Ouster, LeavesOutPixelsWithoutReturn) {
   const OusterMetadata metadata = small_sensor(OusterProfile::kRng19);
   Log log;
   OusterDecoder decoder(metadata, "test", log);
-  add(decoder, make_ouster(metadata, 1, 0, 1'000, 0));
+  add_ouster(decoder, make_ouster(metadata, 1, 0, 1'000, 0));
   EXPECT_TRUE(drain(decoder).empty());
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/sensor/scan.h"
 #include "understory/util/time.h"
 
 namespace understory::test {
@@ -75,6 +76,9 @@ inline Bytes make_position_packet(std::uint32_t us, const std::string& sentence)
   return bytes;
 }
 
+// The start of an hour, at which a sensor's time of the hour is zero.
+inline constexpr TimeNs kHourStart = 1'700'002'800 * kNsPerSecond;
+
 inline Bytes make_udp(std::uint16_t port, const Bytes& payload) {
   Bytes bytes;
   put_big(bytes, std::uint16_t{5000});
@@ -83,6 +87,14 @@ inline Bytes make_udp(std::uint16_t port, const Bytes& payload) {
   put_big(bytes, std::uint16_t{0});
   append(bytes, payload);
   return bytes;
+}
+
+// The i-th packet of a lidar that turns ten times a second.
+inline Bytes velodyne_udp(int i) {
+  VelodynePacket packet;
+  packet.azimuth_cdeg = (480 * i) % 36000;
+  packet.us = static_cast<std::uint32_t>(1327 * i);
+  return make_udp(2368, make_packet(packet));
 }
 
 // Fills in the checksum for the addresses that make_ip gives.
@@ -134,6 +146,16 @@ inline void add_record(Bytes& file, TimeNs stamp, const Bytes& frame) {
   put(file, static_cast<std::uint32_t>(frame.size()));
   put(file, static_cast<std::uint32_t>(frame.size()));
   append(file, frame);
+}
+
+// All scans of a decoder that gets no more packets.
+template <typename Decoder>
+std::vector<ScanPtr> drain(Decoder& decoder) {
+  decoder.finish();
+  std::vector<ScanPtr> scans;
+  while (ScanPtr scan = decoder.take_scan())
+    scans.push_back(scan);
+  return scans;
 }
 
 }  // namespace understory::test

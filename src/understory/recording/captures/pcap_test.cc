@@ -12,16 +12,10 @@ namespace understory {
 namespace {
 
 using test::Bytes;
+using test::kHourStart;
+using test::velodyne_udp;
 
-constexpr TimeNs kHourStart = 1'700'002'800 * kNsPerSecond;
 constexpr int kPackets = 150;  // two turns
-
-Bytes velodyne_udp(int i) {
-  test::VelodynePacket packet;
-  packet.azimuth_cdeg = (480 * i) % 36000;
-  packet.us = static_cast<std::uint32_t>(1327 * i);
-  return test::make_udp(2368, test::make_packet(packet));
-}
 
 TimeNs stamp_of(int i) {
   return kHourStart + i * 1'327'000LL;
@@ -40,15 +34,15 @@ Bytes make_capture(Wrap wrap = plain, std::uint32_t link_type = 1) {
   return file;
 }
 
-struct Read {
+struct ReadCapture {
   std::size_t scans = 0;
   std::size_t points = 0;
   std::string format;
 };
 
-Read read(const Bytes& file, Log& log) {
+ReadCapture read_capture(const Bytes& file, Log& log) {
   const auto recording = open_pcap(bytes_in_memory(file, "test.pcap"), {}, log);
-  Read result;
+  ReadCapture result;
   while (const auto event = recording->next()) {
     if (const auto* scan = std::get_if<ScanPtr>(&*event)) {
       ++result.scans;
@@ -61,7 +55,7 @@ Read read(const Bytes& file, Log& log) {
 
 void expect_all(const Bytes& file) {
   Log log;
-  const Read result = read(file, log);
+  const ReadCapture result = read_capture(file, log);
   EXPECT_EQ(result.scans, 2U);
   EXPECT_EQ(result.points, kPackets * 384U);
   EXPECT_TRUE(log.warnings().empty()) << test::all_warnings(log);
@@ -139,7 +133,7 @@ TEST(Pcap, ReadsPcapng) {
   }
   expect_all(file);
   Log log;
-  EXPECT_EQ(read(file, log).format, "PCAPNG (Velodyne VLP-16)");
+  EXPECT_EQ(read_capture(file, log).format, "PCAPNG (Velodyne VLP-16)");
 }
 
 TEST(Pcap, KeepsWhatComesBeforeTheCut) {
@@ -147,7 +141,7 @@ TEST(Pcap, KeepsWhatComesBeforeTheCut) {
   const std::size_t record = (file.size() - 24) / kPackets;
   file.resize(24 + 100 * record + 700);
   Log log;
-  EXPECT_EQ(read(file, log).points, 100U * 384);
+  EXPECT_EQ(read_capture(file, log).points, 100U * 384);
   EXPECT_EQ(test::count_of(log, "recording.truncated"), 1U);
 }
 
@@ -156,7 +150,7 @@ TEST(Pcap, GoesOnBehindADamagedRecordHeader) {
   const std::size_t record = (file.size() - 24) / kPackets;
   file[24 + 50 * record + 10] = 0xFF;  // its length
   Log log;
-  EXPECT_EQ(read(file, log).points, (kPackets - 1) * 384U);
+  EXPECT_EQ(read_capture(file, log).points, (kPackets - 1) * 384U);
   EXPECT_EQ(test::count_of(log, "recording.damaged"), 1U) << test::all_warnings(log);
 }
 
@@ -165,7 +159,7 @@ TEST(Pcap, LeavesOutARecordWhoseTimeIsDaysOff) {
   const std::size_t record = (file.size() - 24) / kPackets;
   file[24 + 50 * record + 3] ^= 0x40;  // its seconds
   Log log;
-  EXPECT_EQ(read(file, log).points, (kPackets - 1) * 384U);
+  EXPECT_EQ(read_capture(file, log).points, (kPackets - 1) * 384U);
   EXPECT_EQ(test::count_of(log, "recording.damaged"), 1U) << test::all_warnings(log);
 }
 
@@ -180,7 +174,7 @@ TEST(Pcap, NamesAPacketOfAVelodyneThatIsCut) {
     test::add_record(file, stamp_of(i), plain(test::make_ip(test::make_udp(2368, payload))));
   }
   Log log;
-  EXPECT_EQ(read(file, log).points, (kPackets - 1) * 384U);
+  EXPECT_EQ(read_capture(file, log).points, (kPackets - 1) * 384U);
   EXPECT_NE(test::all_warnings(log).find("has 700 bytes, expected 1206"), std::string::npos)
       << test::all_warnings(log);
 }
@@ -192,7 +186,7 @@ TEST(Pcap, NamesLidarsOfAnUnknownKindWithTheWayAround) {
       test::add_record(file, stamp_of(i), plain(test::make_ip(udp)));
     Log log;
     try {
-      read(file, log);
+      read_capture(file, log);
     } catch (const InputError& error) {
       return error.what();
     }
@@ -221,7 +215,7 @@ TEST(Pcap, LeavesOutPacketsWhoseChecksumIsWrong) {
     test::add_record(file, stamp_of(i), plain(test::make_ip(udp)));
   }
   Log log;
-  EXPECT_EQ(read(file, log).points, (kPackets - 1) * 384U);
+  EXPECT_EQ(read_capture(file, log).points, (kPackets - 1) * 384U);
   EXPECT_EQ(test::count_of(log, "recording.damaged_packet"), 1U) << test::all_warnings(log);
 }
 
@@ -268,9 +262,9 @@ TEST(Pcap, FindsALidarThatStartsLate) {
     test::add_record(with_lidar, stamp_of(i), plain(test::make_ip(velodyne_udp(i))));
   expect_all(with_lidar);
   Log log;
-  EXPECT_EQ(read(with_lidar, log).format, "PCAP (Velodyne VLP-16)");
+  EXPECT_EQ(read_capture(with_lidar, log).format, "PCAP (Velodyne VLP-16)");
   try {
-    (void)read(file, log);
+    (void)read_capture(file, log);
     FAIL() << "accepted";
   } catch (const InputError& error) {
     const std::string said = error.what();
@@ -364,7 +358,7 @@ TEST(Pcap, SaysThatTwoMakersShareAnAddress) {
   for (int i = 0; i < 20; ++i)
     test::add_record(file, stamp_of(i), plain(test::make_ip(test::make_udp(2368, hesai.bytes()))));
   Log log;
-  EXPECT_EQ(read(file, log).points, kPackets * 384U);
+  EXPECT_EQ(read_capture(file, log).points, kPackets * 384U);
   EXPECT_EQ(test::count_of(log, "recording.lidars"), 1U) << test::all_warnings(log);
 }
 

@@ -3,33 +3,25 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "understory/recording/captures/packet_test_support.h"
 #include "understory/recording/recording_test_support.h"
+#include "understory/util/angles.h"
 
 namespace understory {
 namespace {
 
+using test::drain;
 using test::make_packet;
 using test::VelodynePacket;
 
 constexpr TimeNs kHour = 3600 * kNsPerSecond;
 constexpr TimeNs kFullHour = 1'700'002'800 * kNsPerSecond;  // 472222 hours since 1970
 static_assert(kFullHour % kHour == 0);
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
-void add(VelodyneDecoder& decoder, const VelodynePacket& packet, TimeNs stamp) {
+void add_velodyne(VelodyneDecoder& decoder, const VelodynePacket& packet, TimeNs stamp) {
   const test::Bytes bytes = make_packet(packet);
   decoder.add_packet(bytes.data(), bytes.size(), stamp);
-}
-
-std::vector<ScanPtr> drain(VelodyneDecoder& decoder) {
-  decoder.finish();
-  std::vector<ScanPtr> scans;
-  while (ScanPtr scan = decoder.take_scan())
-    scans.push_back(scan);
-  return scans;
 }
 
 TEST(Velodyne, PlacesEachFiringByTheManual) {
@@ -38,7 +30,7 @@ TEST(Velodyne, PlacesEachFiringByTheManual) {
   VelodynePacket packet;
   packet.azimuth_cdeg = 9000;
   packet.us = 7'000'000;
-  add(decoder, packet, kFullHour + 7 * kNsPerSecond);
+  add_velodyne(decoder, packet, kFullHour + 7 * kNsPerSecond);
   const auto scans = drain(decoder);
   ASSERT_EQ(scans.size(), 1U);
   const Scan& scan = *scans[0];
@@ -52,11 +44,11 @@ TEST(Velodyne, PlacesEachFiringByTheManual) {
   EXPECT_EQ(point.t_ns, static_cast<std::uint32_t>(std::llround(microseconds * 1000.0)));
   EXPECT_EQ(point.ring, 9);
   EXPECT_EQ(point.intensity, 19.0F);
-  const double azimuth = (90.0 + 0.4 * microseconds / 110.592) * kRadPerDeg;
+  const double azimuth = (90.0 + 0.4 * microseconds / 110.592) * kDegree;
   const double range = 5.0;
-  EXPECT_NEAR(point.x, range * std::cos(3.0 * kRadPerDeg) * std::cos(azimuth), 1e-5);
-  EXPECT_NEAR(point.y, -range * std::cos(3.0 * kRadPerDeg) * std::sin(azimuth), 1e-5);
-  EXPECT_NEAR(point.z, range * std::sin(3.0 * kRadPerDeg) - 0.0022, 1e-5);
+  EXPECT_NEAR(point.x, range * std::cos(3.0 * kDegree) * std::cos(azimuth), 1e-5);
+  EXPECT_NEAR(point.y, -range * std::cos(3.0 * kDegree) * std::sin(azimuth), 1e-5);
+  EXPECT_NEAR(point.z, range * std::sin(3.0 * kDegree) - 0.0022, 1e-5);
 }
 
 TEST(Velodyne, RingsRiseWithTheBeams) {
@@ -78,7 +70,7 @@ TEST(Velodyne, DualReturnKeepsBothOrOneIfTheSame) {
   packet.mode = 0x39;
   packet.distance = 2500;
   packet.other = 1500;
-  add(decoder, packet, kFullHour);
+  add_velodyne(decoder, packet, kFullHour);
   auto scans = drain(decoder);
   ASSERT_EQ(scans.size(), 1U);
   EXPECT_EQ(scans[0]->points.size(), 384U);
@@ -89,7 +81,7 @@ TEST(Velodyne, DualReturnKeepsBothOrOneIfTheSame) {
   EXPECT_EQ(scans[0]->end() - scans[0]->stamp, std::llround((11 * 55.296 + 15 * 2.304) * 1000.0));
   packet.other = packet.distance;
   packet.us = 700;
-  add(decoder, packet, kFullHour + 700'000);
+  add_velodyne(decoder, packet, kFullHour + 700'000);
   scans = drain(decoder);
   ASSERT_EQ(scans.size(), 1U);
   EXPECT_EQ(scans[0]->points.size(), 192U);
@@ -104,7 +96,7 @@ TEST(Velodyne, CutsScansWhereTheHeadPassesTheStart) {
     VelodynePacket packet;
     packet.azimuth_cdeg = (480 * i) % 36000;
     packet.us = static_cast<std::uint32_t>(1327 * i);
-    add(decoder, packet, kFullHour + i * 1'327'000LL);
+    add_velodyne(decoder, packet, kFullHour + i * 1'327'000LL);
   }
   // The first half turn is left out, the last one kept.
   const auto scans = drain(decoder);
@@ -128,7 +120,7 @@ TEST(Velodyne, LeavesOutAFirstScanThatIsAPart) {
       VelodynePacket packet;
       packet.azimuth_cdeg = (480 * i) % 36000;
       packet.us = static_cast<std::uint32_t>(1327 * i);
-      add(decoder, packet, kFullHour + i * 1'327'000LL);
+      add_velodyne(decoder, packet, kFullHour + i * 1'327'000LL);
     }
     const bool part = first > 7;
     const auto scans = drain(decoder);
@@ -143,7 +135,7 @@ TEST(Velodyne, KeepsAPartThatIsAll) {
   VelodyneDecoder decoder({}, "test", log);
   VelodynePacket packet;
   packet.azimuth_cdeg = 30'000;
-  add(decoder, packet, kFullHour);
+  add_velodyne(decoder, packet, kFullHour);
   EXPECT_EQ(drain(decoder).size(), 1U);
   EXPECT_EQ(test::all_warnings(log), "");
 }
@@ -153,10 +145,10 @@ TEST(Velodyne, LeavesOutZeroAndNearReturns) {
   VelodyneDecoder decoder({}, "test", log);
   VelodynePacket packet;
   packet.distance = 0;
-  add(decoder, packet, kFullHour);
+  add_velodyne(decoder, packet, kFullHour);
   packet.distance = 40;  // 8 cm
   packet.us = 1327;
-  add(decoder, packet, kFullHour + 1'327'000);
+  add_velodyne(decoder, packet, kFullHour + 1'327'000);
   EXPECT_TRUE(drain(decoder).empty());
 }
 
@@ -177,7 +169,7 @@ TEST(Velodyne, PositionPacketsGiveTheHourAndTheFix) {
   EXPECT_FALSE(decoder.add_position_packet(position.data(), position.size()));
   VelodynePacket packet;
   packet.us = 1'082'343'000;
-  add(decoder, packet, 1'453'364'282 * kNsPerSecond + 2 * kHour);
+  add_velodyne(decoder, packet, 1'453'364'282 * kNsPerSecond + 2 * kHour);
   const auto scans = drain(decoder);
   ASSERT_EQ(scans.size(), 1U);
   EXPECT_EQ(scans[0]->stamp, 1'453'364'282 * kNsPerSecond + 343'000'000);
@@ -191,7 +183,8 @@ TEST(Velodyne, FollowsTheStampsWhereTheSensorHasNoUtc) {
     packet.us = static_cast<std::uint32_t>(140'000'000 + 1327 * i);
     packet.azimuth_cdeg = 480 * i;
     // Jitter of the receiver must not reach the times.
-    add(decoder, packet, kFullHour + 1671 * kNsPerSecond + i * 1'327'000LL + (i % 3) * 200'000);
+    add_velodyne(decoder, packet,
+                 kFullHour + 1671 * kNsPerSecond + i * 1'327'000LL + (i % 3) * 200'000);
   }
   const auto scans = drain(decoder);
   ASSERT_EQ(scans.size(), 1U);
@@ -204,10 +197,10 @@ TEST(Velodyne, CountsOnAcrossTheHour) {
   VelodyneDecoder decoder({}, "test", log);
   VelodynePacket packet;
   packet.us = 3'599'999'000;
-  add(decoder, packet, kFullHour + kHour - 1'000'000);
+  add_velodyne(decoder, packet, kFullHour + kHour - 1'000'000);
   packet.us = 327;
   packet.azimuth_cdeg = 480;
-  add(decoder, packet, kFullHour + kHour + 327'000);
+  add_velodyne(decoder, packet, kFullHour + kHour + 327'000);
   const auto scans = drain(decoder);
   ASSERT_EQ(scans.size(), 1U);
   EXPECT_EQ(scans[0]->points[384].t_ns, 1'327'000U);
@@ -231,10 +224,10 @@ TEST(Velodyne, PassesOverDamageAndGoesOn) {
   decoder.add_packet(bytes.data(), bytes.size(), kFullHour + 2'327'000);
   packet.us = 1'803'654'000;  // half an hour off
   packet.azimuth_cdeg = 960;
-  add(decoder, packet, kFullHour + 3'654'000);
+  add_velodyne(decoder, packet, kFullHour + 3'654'000);
   packet.us = 4981;
   packet.azimuth_cdeg = 1440;
-  add(decoder, packet, kFullHour + 4'981'000);
+  add_velodyne(decoder, packet, kFullHour + 4'981'000);
   const auto scans = drain(decoder);
   ASSERT_EQ(scans.size(), 1U);
   EXPECT_EQ(scans[0]->points.size(), 10U * 32 + 384);
@@ -250,8 +243,8 @@ TEST(Velodyne, LeavesOutPacketsThatComeTwice) {
     packet.us = static_cast<std::uint32_t>(1327 * i);
     packet.azimuth_cdeg = static_cast<std::uint16_t>(480 * i);
     const TimeNs stamp = kFullHour + 1'327'000LL * i;
-    add(decoder, packet, stamp);
-    if (i == 1) add(decoder, packet, stamp + 30'000);
+    add_velodyne(decoder, packet, stamp);
+    if (i == 1) add_velodyne(decoder, packet, stamp + 30'000);
   }
   const auto scans = drain(decoder);
   ASSERT_EQ(scans.size(), 1U);

@@ -16,7 +16,7 @@ namespace {
 
 using test::Bytes;
 
-constexpr int kPoints = 50;
+constexpr int kCloudPoints = 50;
 const float kNan = std::nanf("");
 
 struct TestPoint {
@@ -29,7 +29,7 @@ TestPoint test_point(int i) {
           static_cast<float>(i), static_cast<std::uint32_t>(1000 * i)};
 }
 
-std::string pcd_header(const std::string& data, int points = kPoints) {
+std::string pcd_header(const std::string& data, int points = kCloudPoints) {
   return "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity t\nSIZE 4 4 4 4 4\nTYPE F F F F U\n"
          "COUNT 1 1 1 1 1\nWIDTH " +
          std::to_string(points) + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " +
@@ -38,7 +38,7 @@ std::string pcd_header(const std::string& data, int points = kPoints) {
 
 std::string ply_header(const std::string& format) {
   return "ply\nformat " + format + " 1.0\ncomment made for a test\nelement vertex " +
-         std::to_string(kPoints) +
+         std::to_string(kCloudPoints) +
          "\nproperty float x\nproperty float y\nproperty float z\nproperty float "
          "scalar_Intensity\nproperty uint t\nelement face 0\nproperty list uchar int "
          "vertex_indices\nend_header\n";
@@ -46,7 +46,7 @@ std::string ply_header(const std::string& format) {
 
 std::string ascii_points() {
   std::string text;
-  for (int i = 0; i < kPoints; ++i) {
+  for (int i = 0; i < kCloudPoints; ++i) {
     const TestPoint p = test_point(i);
     text += std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) + " " +
             std::to_string(p.intensity) + " " + std::to_string(p.t) + "\n";
@@ -56,7 +56,7 @@ std::string ascii_points() {
 
 Bytes binary_points(bool with_time = true, bool swap = false) {
   Bytes bytes;
-  for (int i = 0; i < kPoints; ++i) {
+  for (int i = 0; i < kCloudPoints; ++i) {
     const TestPoint p = test_point(i);
     for (const float value : {p.x, p.y, p.z, p.intensity})
       test::put(bytes, value);
@@ -112,7 +112,7 @@ Bytes lzf_compress(const Bytes& in) {
 Bytes compressed_points() {
   Bytes columns;
   for (int field = 0; field < 5; ++field) {
-    for (int i = 0; i < kPoints; ++i) {
+    for (int i = 0; i < kCloudPoints; ++i) {
       const TestPoint p = test_point(i);
       const float values[] = {p.x, p.y, p.z, p.intensity};
       if (field < 4) {
@@ -131,7 +131,7 @@ Bytes compressed_points() {
   return bytes;
 }
 
-PointCloudFile read(const Bytes& bytes, Log& log, const std::string& name = "cloud.x") {
+PointCloudFile read_cloud_bytes(const Bytes& bytes, Log& log, const std::string& name = "cloud.x") {
   const auto file = bytes_in_memory(bytes, name);
   return read_cloud(*file, log);
 }
@@ -139,11 +139,11 @@ PointCloudFile read(const Bytes& bytes, Log& log, const std::string& name = "clo
 void expect_points(const Bytes& bytes, const std::string& format,
                    const std::string& name = "cloud.x") {
   Log log;
-  const PointCloudFile cloud = read(bytes, log, name);
+  const PointCloudFile cloud = read_cloud_bytes(bytes, log, name);
   EXPECT_EQ(cloud.format, format);
   EXPECT_EQ(cloud.origin, Eigen::Vector3d::Zero());
-  ASSERT_EQ(cloud.points.size(), static_cast<std::size_t>(kPoints));
-  for (int i = 0; i < kPoints; ++i) {
+  ASSERT_EQ(cloud.points.size(), static_cast<std::size_t>(kCloudPoints));
+  for (int i = 0; i < kCloudPoints; ++i) {
     const TestPoint p = test_point(i);
     const auto k = static_cast<std::size_t>(i);
     EXPECT_EQ(cloud.points[k], Eigen::Vector3f(p.x, p.y, p.z));
@@ -172,16 +172,17 @@ TEST(CloudFile, KeepsWhatIsThereOfACutFile) {
   for (const Bytes& file : files) {
     Bytes cut(file.begin(), file.end() - 35);
     Log log;
-    const PointCloudFile cloud = read(cut, log, "cut.bin");
-    EXPECT_GE(cloud.points.size(), kPoints - 3U);
-    EXPECT_LT(cloud.points.size(), static_cast<std::size_t>(kPoints));
+    const PointCloudFile cloud = read_cloud_bytes(cut, log, "cut.bin");
+    EXPECT_GE(cloud.points.size(), kCloudPoints - 3U);
+    EXPECT_LT(cloud.points.size(), static_cast<std::size_t>(kCloudPoints));
     EXPECT_GE(test::count_of(log, "recording.damaged"), 1U);
   }
   // Compressed data hold the columns one after another: only the times are lost.
   Bytes compressed = join(pcd_header("binary_compressed"), compressed_points());
   compressed.resize(compressed.size() - 20);
   Log log;
-  EXPECT_EQ(read(compressed, log).points.size(), static_cast<std::size_t>(kPoints));
+  EXPECT_EQ(read_cloud_bytes(compressed, log).points.size(),
+            static_cast<std::size_t>(kCloudPoints));
   EXPECT_EQ(test::count_of(log, "recording.damaged"), 1U);
 }
 
@@ -189,7 +190,7 @@ TEST(CloudFile, RefusesWithTheFileAndThePlace) {
   const auto message_of = [](const Bytes& bytes) {
     Log log;
     try {
-      (void)read(bytes, log, "bad.bin");
+      (void)read_cloud_bytes(bytes, log, "bad.bin");
     } catch (const InputError& error) {
       return std::string(error.what());
     }
@@ -216,7 +217,7 @@ TEST(CloudFile, SaysHowCoarseSinglePrecisionIsThere) {
                              type + "\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA ascii\n" + x +
                              " 2 3\n";
     Log log;
-    return read(Bytes(text.begin(), text.end()), log).step;
+    return read_cloud_bytes(Bytes(text.begin(), text.end()), log).step;
   };
   EXPECT_EQ(step_at("6800000", "4 4 4", "F F F"), 0.5);
   EXPECT_EQ(step_at("500000", "4 4 4", "F F F"), 0.03125);
@@ -226,10 +227,10 @@ TEST(CloudFile, SaysHowCoarseSinglePrecisionIsThere) {
 
 TEST(CloudFile, LeavesOutNan) {
   Bytes bytes = join(pcd_header("binary"), binary_points());
-  const std::size_t first = bytes.size() - 20 * kPoints;
+  const std::size_t first = bytes.size() - 20 * kCloudPoints;
   std::memcpy(bytes.data() + first + 20 * 3 + 4, &kNan, 4);
   Log log;
-  EXPECT_EQ(read(bytes, log).points.size(), kPoints - 1U);
+  EXPECT_EQ(read_cloud_bytes(bytes, log).points.size(), kCloudPoints - 1U);
 }
 
 // A regression: the origin was the first point, so all others lost their places.
@@ -272,14 +273,14 @@ void write_las(const std::string& path, int format, bool compressed) {
   header->x_offset = 500000.0;
   header->y_offset = 5200000.0;
   if (modern) {
-    header->extended_number_of_point_records = kPoints;
+    header->extended_number_of_point_records = kCloudPoints;
   } else {
-    header->number_of_point_records = kPoints;
+    header->number_of_point_records = kCloudPoints;
   }
   ASSERT_EQ(laszip_open_writer(writer, path.c_str(), compressed ? 1 : 0), 0);
   laszip_point* point = nullptr;
   laszip_get_point_pointer(writer, &point);
-  for (int i = 0; i < kPoints; ++i) {
+  for (int i = 0; i < kCloudPoints; ++i) {
     point->X = 1000 * i;
     point->Y = -250 * i;
     point->Z = 123 + i;
@@ -302,9 +303,9 @@ TEST(CloudFile, ReadsLasAndLazInACoordinateSystem) {
       write_las(path, format, compressed);
       Log log;
       const PointCloudFile cloud = read_cloud(path, log);
-      ASSERT_EQ(cloud.points.size(), static_cast<std::size_t>(kPoints)) << cloud.format;
+      ASSERT_EQ(cloud.points.size(), static_cast<std::size_t>(kCloudPoints)) << cloud.format;
       EXPECT_EQ(cloud.origin, Eigen::Vector3d(500000.0, 5200000.0, 0.0));
-      for (int i = 0; i < kPoints; ++i) {
+      for (int i = 0; i < kCloudPoints; ++i) {
         const auto k = static_cast<std::size_t>(i);
         const Eigen::Vector3d position = cloud.origin + cloud.points[k].cast<double>();
         const Eigen::Vector3d expected(500000.0 + i, 5200000.0 - 0.25 * i, 0.123 + 0.001 * i);
@@ -329,7 +330,7 @@ TEST(CloudFile, SurvivesFlippedBytesInLaz) {
     bytes[at] ^= 0xFF;
     Log log;
     try {
-      readable += read(bytes, log).points.empty() ? 0 : 1;
+      readable += read_cloud_bytes(bytes, log).points.empty() ? 0 : 1;
     } catch (const InputError& error) {
       EXPECT_NE(std::string(error.what()).find("cloud.x"), std::string::npos);
     }
@@ -355,9 +356,9 @@ TEST(CloudFile, FindsTheCoordinateSystemInGeoKeys) {
   std::memcpy(bytes.data() + 96, &offset, 4);
   std::memcpy(bytes.data() + 100, &records, 4);
   Log log;
-  const PointCloudFile cloud = read(bytes, log);
+  const PointCloudFile cloud = read_cloud_bytes(bytes, log);
   EXPECT_EQ(cloud.coordinate_system, "EPSG:25832");
-  EXPECT_EQ(cloud.points.size(), static_cast<std::size_t>(kPoints));
+  EXPECT_EQ(cloud.points.size(), static_cast<std::size_t>(kCloudPoints));
 }
 
 TEST(CloudFile, KeepsWhatIsThereOfACutLas) {
@@ -367,12 +368,12 @@ TEST(CloudFile, KeepsWhatIsThereOfACutLas) {
   Bytes bytes = test::read_bytes(path);
   bytes.resize(bytes.size() - 100);
   Log log;
-  EXPECT_EQ(read(bytes, log).points.size(), kPoints - 4U);
+  EXPECT_EQ(read_cloud_bytes(bytes, log).points.size(), kCloudPoints - 4U);
   EXPECT_EQ(test::count_of(log, "recording.damaged"), 1U);
   bytes.resize(227);
-  EXPECT_THROW((void)read(bytes, log), InputError);
+  EXPECT_THROW((void)read_cloud_bytes(bytes, log), InputError);
   bytes.resize(100);
-  EXPECT_THROW((void)read(bytes, log), InputError);
+  EXPECT_THROW((void)read_cloud_bytes(bytes, log), InputError);
 }
 
 TEST(CloudFile, ReadsRealClouds) {

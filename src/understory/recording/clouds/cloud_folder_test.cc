@@ -25,15 +25,15 @@ void write_text(const std::string& path, const std::string& text) {
   std::ofstream(path, std::ios::binary) << text;
 }
 
-struct Read {
+struct ReadFolder {
   std::vector<TimeNs> stamps;
   std::vector<float> x;  // of each scan's first point
   std::string conventions;
 };
 
-Read read(const std::string& path, const OpenOptions& options, Log& log) {
+ReadFolder read_folder(const std::string& path, const OpenOptions& options, Log& log) {
   const auto recording = open_cloud_folder(path, options, log);
-  Read result;
+  ReadFolder result;
   for (const Event& event : test::read_all(*recording)) {
     const auto* scan = std::get_if<ScanPtr>(&event);
     if (scan == nullptr) continue;
@@ -70,33 +70,33 @@ TEST(CloudFolder, TakesTimesInTheStatedOrder) {
   for (const char* name : {"000002.bin", "000010.bin", "000001.bin"})
     write_kitti(folder / name, static_cast<float>(std::atoi(name)));
   Log log;
-  Read result = read(folder / "", {}, log);
+  ReadFolder result = read_folder(folder / "", {}, log);
   EXPECT_EQ(result.x, (std::vector<float>{1.0F, 2.0F, 10.0F}));
   EXPECT_EQ(result.stamps, (std::vector<TimeNs>{0, 100'000'000, 200'000'000}));
   EXPECT_EQ(test::count_of(log, "recording.assumed_rate"), 1U);
   EXPECT_NE(result.conventions.find("10 Hz"), std::string::npos);
 
   write_text(folder / "times.txt", "0.000000e+00\n1.037359e-01\n2.074e-01\n");
-  result = read(folder / "", {}, log);
+  result = read_folder(folder / "", {}, log);
   EXPECT_EQ(result.stamps, (std::vector<TimeNs>{0, 103'735'900, 207'400'000}));
   write_text(folder / "times.txt", "0\n103735900\n207400000\n");
-  result = read(folder / "", {}, log);
+  result = read_folder(folder / "", {}, log);
   EXPECT_EQ(result.stamps, (std::vector<TimeNs>{0, 103'735'900, 207'400'000}));
   write_text(folder / "times.txt", "1700000000.5\n1700000000.6\n1700000000.7\n");
-  result = read(folder / "", {}, log);
+  result = read_folder(folder / "", {}, log);
   EXPECT_EQ(result.stamps[1], 1'700'000'000'600'000'000);
   EXPECT_EQ(test::count_of(log, "recording.assumed_rate"), 1U);
 
   OpenOptions options;
   options.rate_hz = 20.0;
-  result = read(folder / "", options, log);
+  result = read_folder(folder / "", options, log);
   EXPECT_EQ(result.stamps, (std::vector<TimeNs>{0, 50'000'000, 100'000'000}));
   EXPECT_NE(result.conventions.find("--rate-hz"), std::string::npos);
 
   write_text(folder / "times.txt", "1\ntwo\n3\n");
-  EXPECT_THROW((void)read(folder / "", {}, log), InputError);
+  EXPECT_THROW((void)read_folder(folder / "", {}, log), InputError);
   write_text(folder / "times.txt", "1.0\n2.0\n");
-  EXPECT_EQ(read(folder / "", {}, log).stamps.size(), 2U);
+  EXPECT_EQ(read_folder(folder / "", {}, log).stamps.size(), 2U);
   EXPECT_EQ(test::count_of(log, "recording.times"), 1U);
 }
 
@@ -153,7 +153,7 @@ TEST(CloudFolder, GoesOnBehindACloudThatCannotBeRead) {
   write_kitti(folder / "000002.bin", 3.0F);
   write_text(folder / "map.pcd", "no scan");
   Log log;
-  const Read result = read(folder / "", {}, log);
+  const ReadFolder result = read_folder(folder / "", {}, log);
   EXPECT_EQ(result.x, (std::vector<float>{1.0F, 3.0F}));
   EXPECT_EQ(result.stamps, (std::vector<TimeNs>{0, 200'000'000}));
   EXPECT_EQ(test::count_of(log, "recording.other_clouds"), 1U);
@@ -191,7 +191,7 @@ TEST(CloudFolder, OneCloudIsARecordingOfOneScan) {
   write_kitti(folder / "lonely.bin", 4.0F);
   Log log;
   ASSERT_TRUE(is_cloud_file(folder / "lonely.bin"));
-  const Read result = read(folder / "lonely.bin", {}, log);
+  const ReadFolder result = read_folder(folder / "lonely.bin", {}, log);
   EXPECT_EQ(result.x, std::vector<float>{4.0F});
   EXPECT_TRUE(log.warnings().empty()) << test::all_warnings(log);
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "understory/recording/captures/packet_test_support.h"
 #include "understory/recording/clouds/cloud_file.h"
 #include "understory/recording/clouds/e57_pages.h"
 #include "understory/recording/finding.h"
@@ -14,13 +15,8 @@ namespace understory {
 namespace {
 
 using Eigen::Vector3d;
-using Bytes = std::vector<std::uint8_t>;
-
-template <typename T>
-void put(Bytes& bytes, T value) {
-  const auto* raw = reinterpret_cast<const std::uint8_t*>(&value);
-  bytes.insert(bytes.end(), raw, raw + sizeof(T));
-}
+using test::Bytes;
+using test::put;
 
 // Integers of `bits` bits, one behind the other from the lowest bit on.
 Bytes packed(const std::vector<std::uint64_t>& values, int bits) {
@@ -127,7 +123,7 @@ struct ReadCloud {
   std::uint64_t damage = 0;
 };
 
-ReadCloud read(Bytes bytes) {
+ReadCloud read_e57(Bytes bytes) {
   Log log;
   const auto source = bytes_in_memory(std::move(bytes), "cloud.e57");
   ReadCloud result{read_cloud(*source, log), 0};
@@ -141,7 +137,7 @@ Vector3d point(const ReadCloud& read, std::size_t i) {
 
 std::string refusal(Bytes bytes) {
   try {
-    (void)read(std::move(bytes));
+    (void)read_e57(std::move(bytes));
   } catch (const InputError& error) {
     return error.what();
   }
@@ -156,8 +152,8 @@ TEST(E57, FloatsComeWithThePoseOfTheirScan) {
   const std::string pose =
       "<pose><rotation><w>0.7071067811865476</w><x/><y/><z>0.7071067811865476</z></rotation>"
       "<translation><x>400000.25</x><y>6800000</y><z>-2</z></translation></pose>";
-  const ReadCloud got = read(maker.file(scan_xml(place, 2, kFloats, pose),
-                                        "<coordinateMetadata>EPSG:3067</coordinateMetadata>"));
+  const ReadCloud got = read_e57(maker.file(scan_xml(place, 2, kFloats, pose),
+                                            "<coordinateMetadata>EPSG:3067</coordinateMetadata>"));
   ASSERT_EQ(got.cloud.points.size(), 2U);
   EXPECT_LT((point(got, 0) - Vector3d(400000.25, 6800001.0, 3.0)).norm(), 1e-4);
   EXPECT_LT((point(got, 1) - Vector3d(399999.25, 6800002.0, 4.0)).norm(), 1e-4);
@@ -171,7 +167,7 @@ TEST(E57, FloatsFarFromTheOriginSayHowCoarseTheyAre) {
   E57Maker maker;
   const std::uint64_t place =
       maker.add_section({packet({floats({400000}), floats({6.8e6F}), floats({5})})});
-  EXPECT_EQ(read(maker.file(scan_xml(place, 1, kFloats))).cloud.step, 0.5);
+  EXPECT_EQ(read_e57(maker.file(scan_xml(place, 1, kFloats))).cloud.step, 0.5);
 }
 
 TEST(E57, NumbersOfAnyBitsRunOnFromPacketToPacket) {
@@ -203,7 +199,7 @@ TEST(E57, NumbersOfAnyBitsRunOnFromPacketToPacket) {
   }
   E57Maker maker;
   const std::uint64_t place = maker.add_section(packets);
-  const ReadCloud got = read(maker.file(scan_xml(place, 300, kScaled)));
+  const ReadCloud got = read_e57(maker.file(scan_xml(place, 300, kScaled)));
   ASSERT_EQ(got.cloud.points.size(), 270U);
   EXPECT_EQ(got.damage, 0U);
   std::size_t k = 0;
@@ -226,7 +222,7 @@ TEST(E57, RangesAndAnglesBecomePoints) {
        {std::pair{"cartesianX", "sphericalRange"}, std::pair{"cartesianY", "sphericalAzimuth"},
         std::pair{"cartesianZ", "sphericalElevation"}})
     prototype.replace(prototype.find(from), std::strlen(from), to);
-  const ReadCloud got = read(maker.file(scan_xml(place, 2, prototype)));
+  const ReadCloud got = read_e57(maker.file(scan_xml(place, 2, prototype)));
   ASSERT_EQ(got.cloud.points.size(), 2U);
   EXPECT_LT((point(got, 0) - Vector3d(10, 0, 0)).norm(), 1e-5);
   EXPECT_LT((point(got, 1) - Vector3d(0, 4 * std::cos(M_PI / 6), 2)).norm(), 1e-5);
@@ -240,9 +236,9 @@ TEST(E57, ScansFollowEachOtherAndOneThatIsDamagedCostsNoOther) {
   const std::uint64_t second = maker.add_section({packet({floats({1}), floats({2}), floats({3})})});
   const std::string scans = scan_xml(first, 2000, kFloats) + scan_xml(second, 1, kFloats);
   Bytes bytes = maker.file(scans);
-  EXPECT_EQ(read(bytes).cloud.points.size(), 2001U);
+  EXPECT_EQ(read_e57(bytes).cloud.points.size(), 2001U);
   bytes[5000] ^= 1U;  // within the first scan
-  const ReadCloud got = read(bytes);
+  const ReadCloud got = read_e57(bytes);
   ASSERT_EQ(got.cloud.points.size(), 1U);
   EXPECT_LT((point(got, 0) - Vector3d(1, 2, 3)).norm(), 1e-6);
   EXPECT_EQ(got.damage, 1U);
@@ -276,7 +272,7 @@ TEST(E57, ACountThatNoFileHoldsTakesNoTime) {
       "<cartesianX type=\"Integer\" minimum=\"1\" maximum=\"1\"/>"
       "<cartesianY type=\"Integer\" minimum=\"2\" maximum=\"2\"/>"
       "<cartesianZ type=\"Integer\" minimum=\"3\" maximum=\"3\"/>";
-  const ReadCloud got = read(maker.file(scan_xml(place, std::size_t{1} << 60U, same)));
+  const ReadCloud got = read_e57(maker.file(scan_xml(place, std::size_t{1} << 60U, same)));
   EXPECT_EQ(got.cloud.points.size(), 1'000'000U);
   EXPECT_EQ(got.damage, 1U);
 }

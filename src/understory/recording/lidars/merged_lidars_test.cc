@@ -113,15 +113,15 @@ std::unique_ptr<Recording> merged(const std::vector<LidarPlan>& plans, Log& log)
   return merge_lidars("fake.mcap", std::move(readers), log);
 }
 
-struct Read {
+struct ReadLidars {
   std::vector<ScanPtr> scans;
   std::vector<TimeNs> samples;
   std::size_t of_first = 0;  // points
   std::size_t of_second = 0;
 };
 
-Read read_all(Recording& recording) {
-  Read read;
+ReadLidars read_lidars(Recording& recording) {
+  ReadLidars read;
   while (const auto event = recording.next()) {
     if (const auto* sample = std::get_if<ImuSample>(&*event)) read.samples.push_back(sample->stamp);
     const auto* scan = std::get_if<ScanPtr>(&*event);
@@ -135,7 +135,7 @@ Read read_all(Recording& recording) {
 
 TEST(MergedLidars, EveryPointComesOnceInTheScanOfItsTimeAndInTheFirstFrame) {
   Log log;
-  const Read read = read_all(*merged(two_plans(), log));
+  const ReadLidars read = read_lidars(*merged(two_plans(), log));
   EXPECT_EQ(read.of_first, 290U);   // 29 scans
   EXPECT_EQ(read.of_second, 288U);  // 32 scans of nine
   EXPECT_EQ(read.samples.size(), 300U);
@@ -173,7 +173,7 @@ TEST(MergedLidars, OneThatDiesLeavesTheOtherAndIsNamedWithTheTime) {
     std::vector<LidarPlan> plans = two_plans();
     plans[dead].end = 1'000 * kMs;
     Log log;
-    const Read read = read_all(*merged(plans, log));
+    const ReadLidars read = read_lidars(*merged(plans, log));
     EXPECT_EQ(read.samples.size(), 300U);
     EXPECT_GT(dead == 0 ? read.of_second : read.of_first, 280U);
     EXPECT_GT(read.scans.back()->stamp, test::kStart + 2'700 * kMs);
@@ -188,7 +188,7 @@ TEST(MergedLidars, OneThatIsSilentForAWhileComesBack) {
     std::vector<LidarPlan> plans = two_plans();
     plans[silent].silent = {{500 * kMs, 2'000 * kMs}};
     Log log;
-    const Read read = read_all(*merged(plans, log));
+    const ReadLidars read = read_lidars(*merged(plans, log));
     EXPECT_GT(silent == 0 ? read.of_second : read.of_first, 280U);
     EXPECT_GT(silent == 0 ? read.of_first : read.of_second, 130U);
     EXPECT_EQ(found(log, Finding::kSilentLidar).count, 1U) << silent;
@@ -202,7 +202,7 @@ TEST(MergedLidars, OneThatBeginsLateJoins) {
     std::vector<LidarPlan> plans = two_plans();
     plans[late].begin = 1'530 * kMs;
     Log log;
-    const Read read = read_all(*merged(plans, log));
+    const ReadLidars read = read_lidars(*merged(plans, log));
     EXPECT_GT(late == 0 ? read.of_second : read.of_first, 280U);
     EXPECT_GT(late == 0 ? read.of_first : read.of_second, 130U);
     ASSERT_EQ(log.warnings().size(), 1U) << late;
@@ -216,7 +216,7 @@ TEST(MergedLidars, OneWithoutAPlaceIsNamed) {
   Log log;
   const auto recording = merged(plans, log);
   try {
-    (void)read_all(*recording);
+    (void)read_lidars(*recording);
     FAIL() << "expected an error";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("/rear"), std::string::npos) << error.what();
@@ -300,7 +300,7 @@ TEST(OpenLidars, TakesAllThatTheFileListsOrThoseThatAreNamed) {
   options.lidar_topic = "/front";
   const auto one = open_lidars("r", options, open, log);
   ASSERT_EQ(asked.options.size(), 3U);
-  const Read read = read_all(*one);
+  const ReadLidars read = read_lidars(*one);
   EXPECT_EQ(read.scans.front()->stamp, test::kStart - 500 * kMs);
 }
 
@@ -315,7 +315,7 @@ TEST(OpenLidars, TheOnlyLidarHasALatenessToo) {
   for (const char* topic : {"", "/front"}) {
     options.lidar_topic = topic;
     EXPECT_EQ(lateness_of(options), 0.25);
-    const auto read = read_all(*open_lidars("r", options, open, log));
+    const auto read = read_lidars(*open_lidars("r", options, open, log));
     EXPECT_EQ(read.scans.front()->stamp, test::kStart - 250 * kMs);
   }
 }

@@ -17,7 +17,17 @@
 namespace understory {
 namespace {
 
-using namespace test;
+using test::all_warnings;
+using test::bytes_of;
+using test::channel;
+using test::count_of;
+using test::expect_same;
+using test::kStart;
+using test::make_scan;
+using test::read_all;
+using test::Stored;
+using test::StoredSource;
+using test::TemporaryFolder;
 
 constexpr const char* kFirst = "livox_ros_driver/CustomMsg";
 constexpr const char* kSecond = "livox_ros_driver2/msg/CustomMsg";

@@ -15,7 +15,17 @@
 namespace understory {
 namespace {
 
-using namespace test;
+using test::all_warnings;
+using test::bytes_of;
+using test::channel;
+using test::count_of;
+using test::kStart;
+using test::make_scan;
+using test::read_all;
+using test::Stored;
+using test::StoredSource;
+using test::TemporaryFolder;
+using test::write_bytes;
 
 // A message whose frame "lidar" is replaced by another name of five letters.
 std::vector<std::uint8_t> with_frame(std::vector<std::uint8_t> data, const std::string& frame) {
@@ -138,7 +148,7 @@ TEST(MessageRecording, JoinsHeadingsToThePositionsOfTheirEpoch) {
 
 // Two receivers at 5 Hz on a carrier that goes north-east at 2 m/s. The second is 90 ms later and a
 // metre north-west of the first: their line leads to 315 degrees.
-struct TwoReceivers {
+struct TwoReceiversBag {
   std::string first_frame = "gps";
   std::string second_frame = "gps_left";
   std::string placed_frame = "gps_left";
@@ -196,7 +206,8 @@ std::size_t headings_of(const std::vector<Event>& events) {
   return headings;
 }
 
-std::size_t headings_of(const TwoReceivers& receivers, Log& log, const OpenOptions& options = {}) {
+std::size_t headings_of(const TwoReceiversBag& receivers, Log& log,
+                        const OpenOptions& options = {}) {
   const std::vector<Stored> messages = receivers.messages();
   const auto recording = open_messages(
       "x.mcap", [&](Log&) { return std::make_unique<StoredSource>(messages); }, options, log);
@@ -204,7 +215,7 @@ std::size_t headings_of(const TwoReceivers& receivers, Log& log, const OpenOptio
 }
 
 TEST(MessageRecording, PositionsOfTwoAntennasTellTheHeading) {
-  const std::vector<Stored> messages = TwoReceivers().messages();
+  const std::vector<Stored> messages = TwoReceiversBag().messages();
   const auto open = [&](Log&) { return std::make_unique<StoredSource>(messages); };
   Log log;
   const auto recording = open_messages("x.mcap", open, {}, log);
@@ -231,24 +242,24 @@ TEST(MessageRecording, PositionsOfTwoAntennasTellTheHeading) {
 }
 
 TEST(MessageRecording, ASecondTopicOfPositionsIsNoAntennaWithoutItsPlace) {
-  const auto why = [](const TwoReceivers& receivers) {
+  const auto why = [](const TwoReceiversBag& receivers) {
     Log log;
     EXPECT_EQ(headings_of(receivers, log), 0U);
     EXPECT_EQ(count_of(log, "recording.second_antenna"), 1U);
     EXPECT_EQ(log.warnings().size(), 1U);
     return all_warnings(log);
   };
-  TwoReceivers one_frame;
+  TwoReceiversBag one_frame;
   one_frame.second_frame = "gps";
   EXPECT_NE(why(one_frame).find("both are in the frame gps"), std::string::npos);
-  TwoReceivers no_place;
+  TwoReceiversBag no_place;
   no_place.placed_frame = "gps_right";
   EXPECT_NE(why(no_place).find("the place of gps_left on the body is not known"),
             std::string::npos);
-  TwoReceivers filter;
+  TwoReceiversBag filter;
   filter.second_frame = "base_link";
   EXPECT_NE(why(filter).find("their frame is that of the body, base_link"), std::string::npos);
-  TwoReceivers together;
+  TwoReceiversBag together;
   together.distance_m = 0.01;
   EXPECT_NE(why(together).find("less than a decimetre apart"), std::string::npos);
 }
@@ -262,7 +273,7 @@ TEST(MessageRecording, AFileThatPlacesAntennasNeedsTheTopicOfTheFirst) {
   OpenOptions options;
   options.extrinsics_file = folder / "rig.yaml";
   write_bytes(options.extrinsics_file, {text.begin(), text.end()});
-  TwoReceivers receivers;
+  TwoReceiversBag receivers;
   receivers.second_frame = "gps";
   Log log;
   EXPECT_EQ(headings_of(receivers, log, options), 0U);
@@ -274,7 +285,7 @@ TEST(MessageRecording, AFileThatPlacesAntennasNeedsTheTopicOfTheFirst) {
 }
 
 TEST(MessageRecording, PositionsThatAreNotAsFarApartAsTheAntennasTellNone) {
-  TwoReceivers receivers;
+  TwoReceiversBag receivers;
   receivers.distance_m = 1.6;
   Log log;
   EXPECT_EQ(headings_of(receivers, log), 0U);
@@ -302,12 +313,12 @@ TEST(MessageRecording, PositionsThatAreNotAsFarApartAsTheAntennasTellNone) {
 }
 
 TEST(MessageRecording, ASecondAntennaThatComesLateIsUsedFromThenOn) {
-  TwoReceivers late;
+  TwoReceiversBag late;
   late.second_begins = kStart + 7'000'000'000LL;
   Log log;
   EXPECT_EQ(headings_of(late, log), 20U);
   EXPECT_EQ(all_warnings(log), "");
-  TwoReceivers late_place;
+  TwoReceiversBag late_place;
   late_place.placed_at = kStart + 7'000'000'000LL;
   Log placed;
   EXPECT_GT(headings_of(late_place, placed), 18U);
@@ -316,7 +327,7 @@ TEST(MessageRecording, ASecondAntennaThatComesLateIsUsedFromThenOn) {
 
 // Sentences tell the heading better; the second topic of positions stays out then.
 TEST(MessageRecording, SentencesComeBeforePositionsOfASecondAntenna) {
-  std::vector<Stored> messages = TwoReceivers().messages();
+  std::vector<Stored> messages = TwoReceiversBag().messages();
   const auto sentences = channel("/nmea", "nmea_msgs/msg/Sentence");
   for (int i = 0; i < 60; ++i) {
     const TimeNs now = kStart + i * 200'000'000LL;

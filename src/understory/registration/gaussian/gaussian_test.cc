@@ -49,7 +49,7 @@ IcpMapPtr covariance_map() {
   return builder.snapshot();
 }
 
-Pose turned() {
+Pose small_turn() {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Eigen::Vector3d(1.0, 2.0, -1.0).normalized())),
           Eigen::Vector3d(0.04, -0.03, 0.05)};
 }
@@ -88,7 +88,7 @@ TEST(PointToGaussian, ThePairCountsInTheMetricOfTheMap) {
   const IcpMapPtr map = covariance_map();
   GaussianIcpConfig config;
   config.steps.loss.kind = LossKind::kNone;
-  const Pose pose = turned();
+  const Pose pose = small_turn();
   Random random(5);
   const Eigen::Matrix3f own = some_covariance(random).cast<float>();
   for (const bool source_too : {false, true}) {
@@ -163,7 +163,7 @@ void expect_gradient(const Target& target, const GaussianSource& source,
 TEST(PointToGaussian, TheGradientAgreesWithDifferences) {
   const GaussianIcpConfig config;
   expect_gradient(GaussianIcpTarget(covariance_map(), config, false),
-                  {{{0.4F, -0.3F, 0.1F}}, {}, {}}, config.steps, turned());
+                  {{{0.4F, -0.3F, 0.1F}}, {}, {}}, config.steps, small_turn());
 }
 
 GaussianVoxelsPtr grid(bool of_surfaces, double voxel_m) {
@@ -181,7 +181,7 @@ TEST(NdtD2d, TheGradientAgreesWithDifferencesWhileTheSourceTurns) {
   for (const Eigen::Vector3f& mean :
        {Eigen::Vector3f(0.4F, -0.3F, 0.1F), Eigen::Vector3f(2.9F, 0.4F, 3.3F)}) {
     const GaussianSource source{{mean}, {some_covariance(random).cast<float>()}, {}};
-    expect_gradient(NdtD2dTarget(grid(false, 1.0), config), source, config.steps, turned());
+    expect_gradient(NdtD2dTarget(grid(false, 1.0), config), source, config.steps, small_turn());
   }
 }
 
@@ -190,7 +190,7 @@ TEST(NdtD2d, APairCountsByTheExponentialOfItsDistance) {
   NdtD2dMatcherConfig config;
   const GaussianVoxelsPtr cells = grid(false, 1.0);
   Random random(7);
-  const Pose pose = turned();
+  const Pose pose = small_turn();
   const Eigen::Matrix3d own = some_covariance(random);
   const GaussianSource source{{{0.4F, -0.3F, 0.1F}}, {own.cast<float>()}, {}};
   Eigen::Vector3d offset;
@@ -275,7 +275,7 @@ TEST(Vgicp, APairCountsInTheMetricOfItsSurfaceAndTheVoxels) {
   VgicpMatcherConfig config;
   config.steps.loss.kind = LossKind::kNone;
   const GaussianVoxelsPtr voxels = grid(true, 1.0);
-  const Pose pose = turned();
+  const Pose pose = small_turn();
   Random random(9);
   const Eigen::Matrix3d own = some_covariance(random);
   const GaussianSource source{{{0.4F, -0.3F, 0.1F}}, {own.cast<float>()}, {}};

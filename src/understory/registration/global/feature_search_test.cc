@@ -12,10 +12,13 @@
 #include "understory/registration/global/match_verdict.h"
 #include "understory/registration/global/search_cloud.h"
 #include "understory/registration/global/test_scans.h"
+#include "understory/registration/test_stand.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
+
+using testing::upright;
 
 // Sheds on level ground: walls, and nothing that stands upright and alone.
 struct Sheds {
@@ -64,14 +67,10 @@ struct Sheds {
   }
 };
 
-Pose turned(double x, double y, double z, double yaw) {
-  return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())), {x, y, z}};
-}
-
 TEST(FeatureSearch, FindsThePoseWhereNothingStandsAlone) {
   const Sheds sheds(4);
-  const Pose first = turned(0.0, 0.0, 2.0, 0.3);
-  const Pose second = turned(4.0, -3.0, 2.1, 2.2);
+  const Pose first = upright(0.0, 0.0, 2.0, 0.3);
+  const Pose second = upright(4.0, -3.0, 2.1, 2.2);
   SearchCloud target = prepare_search(sheds.scan(first, 1));
   const SearchCloud source = prepare_search(sheds.scan(second, 2));
   target.uprights.clear();  // what little stands alone at the ends of walls
@@ -84,8 +83,8 @@ TEST(FeatureSearch, FindsThePoseWhereNothingStandsAlone) {
 
 TEST(FeatureSearch, HelpsWhereUprightsTellNothing) {
   const Sheds sheds(4);
-  const Pose first = turned(0.0, 0.0, 2.0, 0.3);
-  const Pose second = turned(5.0, 4.0, 2.0, -1.2);
+  const Pose first = upright(0.0, 0.0, 2.0, 0.3);
+  const Pose second = upright(5.0, 4.0, 2.0, -1.2);
   const GlobalRegistration done = register_globally(sheds.scan(first, 1), sheds.scan(second, 2));
   const Pose off = (first.inverse() * second).inverse() * done.result.target_from_source;
   EXPECT_TRUE(done.verdict.trusted) << done.verdict.reason;
@@ -93,8 +92,8 @@ TEST(FeatureSearch, HelpsWhereUprightsTellNothing) {
 }
 
 TEST(FeatureSearch, AnotherPlaceIsNotTrusted) {
-  const SearchCloud target = prepare_search(Sheds(4).scan(turned(0.0, 0.0, 2.0, 0.3), 1));
-  const SearchCloud source = prepare_search(Sheds(5).scan(turned(0.0, 0.0, 2.0, 0.3), 2));
+  const SearchCloud target = prepare_search(Sheds(4).scan(upright(0.0, 0.0, 2.0, 0.3), 1));
+  const SearchCloud source = prepare_search(Sheds(5).scan(upright(0.0, 0.0, 2.0, 0.3), 2));
   EXPECT_FALSE(register_globally(target, source).verdict.trusted);
 }
 
@@ -120,7 +119,7 @@ TEST(FeatureSearch, CornersAreFeaturesAndTheMiddleOfAWallIsNone) {
 
 TEST(FeatureSearch, ConsistentPairsWinAmongStrangers) {
   Random random(7);
-  const Pose truth = turned(3.0, -8.0, 0.4, 2.5);
+  const Pose truth = upright(3.0, -8.0, 0.4, 2.5);
   std::vector<LocalFeature> target;
   std::vector<LocalFeature> source;
   for (int i = 0; i < 60; ++i) {

@@ -23,7 +23,7 @@
 namespace understory {
 namespace {
 
-Pose turned(double x, double y, double z, double yaw, double pitch = 0.0) {
+Pose pitched(double x, double y, double z, double yaw, double pitch = 0.0) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
                              Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY())),
           {x, y, z}};
@@ -38,8 +38,8 @@ void expect_pose(const Pose& found, const Pose& truth, double metres, double deg
 // Two scans of one stand, 8 m and 100 degrees apart, the second tilted.
 struct TwoScans {
   testing::ScanStand stand{3};
-  Pose first = turned(0.0, 0.0, 2.0, 0.3);
-  Pose second = turned(7.0, -4.0, 2.2, 2.0, 0.15);
+  Pose first = pitched(0.0, 0.0, 2.0, 0.3);
+  Pose second = pitched(7.0, -4.0, 2.2, 2.0, 0.15);
   Points target = stand.scan(first, 1);
   Points source = stand.scan(second, 2);
   Pose truth = first.inverse() * second;
@@ -89,7 +89,7 @@ TEST(GlobalMatch, TwoStandsAreNotMatched) {
   const TwoScans& scans = two_scans();
   const testing::ScanStand other(77);
   const GlobalRegistration done =
-      register_globally(scans.target, other.scan(turned(1.0, 2.0, 2.0, 1.0), 5));
+      register_globally(scans.target, other.scan(pitched(1.0, 2.0, 2.0, 1.0), 5));
   EXPECT_FALSE(done.verdict.trusted);
   EXPECT_FALSE(done.verdict.reason.empty());
   EXPECT_LT(done.verdict.chance, 0.5);
@@ -102,7 +102,7 @@ TEST(MatchVerdict, AConvergedMatchInAWrongPlaceIsRefused) {
   result.status = RegistrationStatus::kConverged;
   result.target_from_source = scans.truth;
   EXPECT_TRUE(judged(scans, result).trusted);
-  for (const Pose& step : {turned(2.5, 0.0, 0.0, 0.0), turned(0.0, 0.0, 0.0, 0.3)}) {
+  for (const Pose& step : {pitched(2.5, 0.0, 0.0, 0.0), pitched(0.0, 0.0, 0.0, 0.3)}) {
     result.target_from_source = scans.truth * step;
     const MatchVerdict verdict = judged(scans, result);
     EXPECT_FALSE(verdict.trusted);
@@ -121,15 +121,15 @@ TEST(MatchVerdict, AMatchFromABadGuessBeginsAgainWhereTheSearchPutsIt) {
     terms_of.push_back(terms.size());
     return target->match(source, guess, terms, MatchStart::kFar);
   };
-  const GlobalRegistration near =
-      match_and_judge(scans.target, scans.source, scans.truth * turned(0.1, 0.0, 0.0, 0.01), match);
+  const GlobalRegistration near = match_and_judge(
+      scans.target, scans.source, scans.truth * pitched(0.1, 0.0, 0.0, 0.01), match);
   EXPECT_TRUE(near.verdict.trusted) << near.verdict.reason;
   // Trusted at once: of such sparse scans a first match, and one with their tilt and height.
   ASSERT_EQ(terms_of.size(), 2U);
   EXPECT_EQ(terms_of[0], 0U);
   EXPECT_EQ(terms_of[1], 1U);
   const GlobalRegistration far =
-      match_and_judge(scans.target, scans.source, scans.truth * turned(6.0, 3.0, 0.0, 1.5), match);
+      match_and_judge(scans.target, scans.source, scans.truth * pitched(6.0, 3.0, 0.0, 1.5), match);
   EXPECT_TRUE(far.verdict.trusted) << far.verdict.reason;
   expect_pose(far.result.target_from_source, scans.truth, 0.1, 0.5);
   // Where the bad guess leads too few stems meet, so one match there and two at the second start.
@@ -173,7 +173,7 @@ TEST(MatchVerdict, TheEvidenceTellsTheRightPoseFromAWrongOne) {
   EXPECT_GE(good.matched, 8.0);
   EXPECT_GT(good.matched, 2.0 * good.by_chance);
   EXPECT_LT(good.seen_through, 0.02);
-  const PoseEvidence bad = weigh_pose(target, source, right * turned(2.5, 1.5, 0.0, 0.4));
+  const PoseEvidence bad = weigh_pose(target, source, right * pitched(2.5, 1.5, 0.0, 0.4));
   EXPECT_LT(bad.matched, 0.5 * good.matched);
   EXPECT_GT(bad.seen_through, 3.0 * good.seen_through + 0.02);
   EXPECT_LT(bad.near, good.near);
@@ -184,7 +184,7 @@ TEST(MatchVerdict, AMatchBesideTheRightPoseIsRefused) {
   RegistrationResult result;
   result.status = RegistrationStatus::kConverged;
   for (const double off : {0.28, 0.3, 0.35, 0.45}) {
-    result.target_from_source = scans.truth * turned(off, 0.0, 0.0, 0.0);
+    result.target_from_source = scans.truth * pitched(off, 0.0, 0.0, 0.0);
     const MatchVerdict verdict = judged(scans, result);
     EXPECT_FALSE(verdict.trusted) << off << " m beside it";
     EXPECT_GT(verdict.moved_m, 0.25) << off;
@@ -249,7 +249,7 @@ TEST(GlobalMatch, OddCloudsAreRefusedWithAReason) {
 TEST(LevelCloud, StemsTellWhereUpIs) {
   const testing::ScanStand stand(5);
   for (const double pitch : {-0.4, 0.0, 0.3}) {
-    const Pose pose = turned(0.0, 0.0, 2.0, 0.7, pitch);
+    const Pose pose = pitched(0.0, 0.0, 2.0, 0.7, pitch);
     const UpEstimate found = estimate_up(voxel_means(stand.scan(pose, 3), 0.2));
     const Eigen::Vector3d up = pose.rotation().conjugate() * Eigen::Vector3d::UnitZ();
     EXPECT_LT(std::acos(std::min(1.0, found.up.dot(up))) * 180.0 / M_PI, 2.0) << pitch;
@@ -296,7 +296,7 @@ TEST(Uprights, StemsStandAloneAndAWallDoesNot) {
 
 TEST(UprightSearch, PairsVoteForTheMotionAmongStrangers) {
   Random random(4);
-  const Pose truth = turned(12.0, -5.0, 0.7, 2.4);
+  const Pose truth = pitched(12.0, -5.0, 0.7, 2.4);
   std::vector<Upright> target;
   std::vector<Upright> source;
   for (int i = 0; i < 60; ++i) {

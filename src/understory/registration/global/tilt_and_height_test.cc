@@ -74,7 +74,7 @@ struct LeaningStand {
   }
 };
 
-Pose turned(double x, double y, double z, double yaw, double tilt_x, double tilt_y) {
+Pose tilted(double x, double y, double z, double yaw, double tilt_x, double tilt_y) {
   const Eigen::Quaterniond rotation(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
                                     Eigen::AngleAxisd(tilt_y, Eigen::Vector3d::UnitY()) *
                                     Eigen::AngleAxisd(tilt_x, Eigen::Vector3d::UnitX()));
@@ -89,10 +89,10 @@ struct Fitted {
 // The fit from the true place and heading, with a wrong tilt and height.
 Fitted fitted(const Eigen::Vector2d& wrong_tilt_deg, double wrong_height_m, bool bushes = false) {
   const LeaningStand stand(3);
-  const Pose a = turned(0.0, 0.0, 2.0, 0.0, 0.0, 0.0);
-  const Pose b = turned(5.0, 3.0, 2.3, 0.7, 0.01, -0.008);
+  const Pose a = tilted(0.0, 0.0, 2.0, 0.0, 0.0, 0.0);
+  const Pose b = tilted(5.0, 3.0, 2.3, 0.7, 0.01, -0.008);
   const Pose truth = a.inverse() * b;
-  const Pose tilt = turned(0.0, 0.0, wrong_height_m, 0.0, wrong_tilt_deg.x() * kDegree,
+  const Pose tilt = tilted(0.0, 0.0, wrong_height_m, 0.0, wrong_tilt_deg.x() * kDegree,
                            wrong_tilt_deg.y() * kDegree);
   const Pose start(truth.rotation() * tilt.rotation(), truth.translation() + tilt.translation());
   Fitted done;
@@ -134,11 +134,11 @@ TEST(TiltAndHeight, TheInformationIsOfTiltAndHeightAlone) {
 TEST(TiltAndHeight, OtherStemsAndDenseScansTellNothing) {
   const LeaningStand stand(3);
   const LeaningStand other(4);
-  const SearchCloud a = stand.seen_from(turned(0.0, 0.0, 2.0, 0.0, 0.0, 0.0), 1);
-  SearchCloud b = stand.seen_from(turned(1.0, 0.0, 2.0, 0.1, 0.0, 0.0), 2);
-  const Pose truth = turned(1.0, 0.0, 0.0, 0.1, 0.0, 0.0);
+  const SearchCloud a = stand.seen_from(tilted(0.0, 0.0, 2.0, 0.0, 0.0, 0.0), 1);
+  SearchCloud b = stand.seen_from(tilted(1.0, 0.0, 2.0, 0.1, 0.0, 0.0), 2);
+  const Pose truth = tilted(1.0, 0.0, 0.0, 0.1, 0.0, 0.0);
   EXPECT_EQ(belief_of_sparse(a, b, truth).terms.size(), 1U);
-  EXPECT_TRUE(belief_of_sparse(a, other.seen_from(turned(1.0, 0.0, 2.0, 0.1, 0.0, 0.0), 2), truth)
+  EXPECT_TRUE(belief_of_sparse(a, other.seen_from(tilted(1.0, 0.0, 2.0, 0.1, 0.0, 0.0), 2), truth)
                   .terms.empty());
   SearchCloud dense = a;
   dense.few_rings = false;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kCube = 0.25;
 
-Points random_points(Random& random, std::size_t n, double half_m) {
+Points points_in_cube(Random& random, std::size_t n, double half_m) {
   Points points(n);
   for (Eigen::Vector3f& p : points) {
     for (int k = 0; k < 3; ++k)
@@ -48,7 +48,7 @@ std::vector<Eigen::Vector3d> means_of(const Points& points, const Pose& pose) {
 TEST(IcpMap, FindsTheNearestMean) {
   Random random(3);
   const Pose pose(Eigen::Quaterniond::Identity(), {3000.0, -200.0, 40.0});
-  const Points points = random_points(random, 600, 2.0);
+  const Points points = points_in_cube(random, 600, 2.0);
   IcpMapBuilder builder({.cube_m = kCube, .growth = 0.0, .moved_m = 0.0});
   builder.insert(points, pose);
   const IcpMapPtr map = builder.snapshot();
@@ -135,8 +135,8 @@ TEST(IcpMap, KnowsTheSurfaceAroundEachPoint) {
 // out again, and removed cubes leave no trace.
 TEST(IcpMap, IsTheSameMadeInStepsOrAtOnce) {
   Random random(5);
-  const Points floor = random_points(random, 3000, 3.0);
-  const Points far = random_points(random, 500, 2.0);
+  const Points floor = points_in_cube(random, 3000, 3.0);
+  const Points far = points_in_cube(random, 500, 2.0);
   const Pose away(Eigen::Quaterniond::Identity(), {50.0, 0.0, 0.0});
   const IcpMapConfig config{.cube_m = kCube, .growth = 0.0, .moved_m = 0.0};
   IcpMapBuilder at_once(config);
@@ -169,8 +169,8 @@ TEST(IcpMap, IsTheSameMadeInStepsOrAtOnce) {
 }
 
 // Those of the points, in their order, that are farther than epsilon from all taken before.
-std::vector<Eigen::Vector3d> apart(const Points& points, const Pose& pose, double epsilon_m,
-                                   std::vector<Eigen::Vector3d> taken) {
+std::vector<Eigen::Vector3d> points_apart(const Points& points, const Pose& pose, double epsilon_m,
+                                          std::vector<Eigen::Vector3d> taken) {
   for (const Eigen::Vector3f& point : points) {
     const Eigen::Vector3d p = pose * point.cast<double>();
     bool alone = true;
@@ -207,9 +207,9 @@ TEST(IcpMap, WithEpsilonPointsEnterThatAreFartherFromAllOthers) {
   IcpMapBuilder builder({.cube_m = kCube, .epsilon_m = 0.1});
   std::vector<Eigen::Vector3d> expected;
   for (int cloud = 0; cloud < 3; ++cloud) {
-    const Points points = random_points(random, 1500, 0.8);
+    const Points points = points_in_cube(random, 1500, 0.8);
     builder.insert(points, pose);
-    expected = apart(points, pose, 0.1, expected);
+    expected = points_apart(points, pose, 0.1, expected);
     const IcpMapPtr map = builder.snapshot();
     EXPECT_EQ(map->size(), expected.size());
     EXPECT_LT(farthest_from(expected, points_of(*map)), 1e-5);
@@ -239,7 +239,7 @@ TEST(IcpMap, WithEpsilonPointsEnterThatAreFartherFromAllOthers) {
 TEST(IcpMap, WithEpsilonWhatIsFarIsForgottenAndMayComeAgain) {
   Random random(9);
   IcpMapBuilder builder({.cube_m = kCube, .epsilon_m = 0.1});
-  const Points points = random_points(random, 2000, 2.0);
+  const Points points = points_in_cube(random, 2000, 2.0);
   builder.insert(points, Pose());
   const std::size_t all = builder.snapshot()->size();
   const Eigen::Vector3d corner(2.0, 2.0, 2.0);
@@ -256,8 +256,8 @@ TEST(IcpMap, WithEpsilonWhatIsFarIsForgottenAndMayComeAgain) {
 // Also beside the forgotten ones: no surface remembers them.
 TEST(IcpMap, WithEpsilonIsTheSameMadeInStepsOrAtOnce) {
   Random random(10);
-  const Points near = random_points(random, 6000, 2.0);
-  const Points far = random_points(random, 2000, 2.0);
+  const Points near = points_in_cube(random, 6000, 2.0);
+  const Points far = points_in_cube(random, 2000, 2.0);
   const Pose away(Eigen::Quaterniond::Identity(), {30.0, 0.0, 0.0});
   const Pose beside(Eigen::Quaterniond::Identity(), {4.2, 0.0, 0.0});  // 0.2 m away
   IcpMapConfig config{.cube_m = kCube, .epsilon_m = 0.08, .growth = 0.0, .max_planarity = 0.99};
@@ -307,7 +307,7 @@ TEST(IcpMap, WithEpsilonIsTheSameMadeInStepsOrAtOnce) {
 // The covariance of a cube is that of all points up to two cubes away, here taken one by one.
 TEST(IcpMap, WithEpsilonTheCovarianceIsThatOfTheSurroundings) {
   Random random(11);
-  const Points points = random_points(random, 3000, 1.2);
+  const Points points = points_in_cube(random, 3000, 1.2);
   IcpMapBuilder builder({.cube_m = kCube, .epsilon_m = 0.05, .growth = 0.0, .covariances = true});
   builder.insert(points, Pose());
   const IcpMapPtr map = builder.snapshot();

@@ -2,9 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
-#include <set>
 
 #include "understory/registration/icp/icp_match.h"
 #include "understory/registration/test_stand.h"
@@ -15,46 +13,26 @@ namespace {
 
 using testing::make_stand;
 using testing::scan_stand;
+using testing::small_os0;
+using testing::thin;
+using testing::upright;
 
-testing::Pattern small_os0() {
-  testing::Pattern pattern = testing::os0_128();
-  pattern.rings = 64;
-  pattern.columns = 512;
-  return pattern;
-}
-
-Pose upright(double x, double y, double z, double yaw = 0.0) {
-  return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())),
-          Eigen::Vector3d(x, y, z)};
-}
-
-// The first point in each cube of 0.25 m.
-Points thin(const Points& points) {
-  std::set<std::array<int, 3>> seen;
-  Points kept;
-  for (const Eigen::Vector3f& p : points) {
-    const auto cube = [](float v) { return static_cast<int>(std::floor(v / 0.25F)); };
-    if (seen.insert({cube(p.x()), cube(p.y()), cube(p.z())}).second) kept.push_back(p);
-  }
-  return kept;
-}
-
-struct Pair {
+struct ScanPair {
   Points target;
   Points source;
   Pose truth;  // target_from_source
 };
 
-Pair make_pair(std::uint64_t seed) {
+ScanPair make_scan_pair(std::uint64_t seed) {
   const testing::Stand stand = make_stand({.half_width_m = 20.0, .crowns = false}, seed);
   const Pose a = upright(0, 0, 1.6);
   const Pose b = upright(0.3, 0.1, 1.65, 0.04);
-  return {thin(scan_stand(stand, a, small_os0(), 1)), thin(scan_stand(stand, b, small_os0(), 2)),
-          a.inverse() * b};
+  return {thin(scan_stand(stand, a, small_os0(), 1), 0.25F),
+          thin(scan_stand(stand, b, small_os0(), 2), 0.25F), a.inverse() * b};
 }
 
 TEST(Icp, RecoversKnownMotionsWithBothMetrics) {
-  const Pair pair = make_pair(3);
+  const ScanPair pair = make_scan_pair(3);
   const Pose guess =
       pair.truth * Pose::exp((Vector6d() << 0.01, -0.01, 0.02, 0.1, -0.1, 0.05).finished());
   for (const auto metric : {IcpConfig::Metric::kPointToPlane, IcpConfig::Metric::kPointToPoint}) {
@@ -76,15 +54,15 @@ TEST(Icp, FlatGroundIsUndetermined) {
   const testing::Stand flat;
   const Pose a = upright(0, 0, 2.0);
   const IcpConfig config;
-  const IcpTarget target(thin(scan_stand(flat, a, small_os0(), 1)), config);
+  const IcpTarget target(thin(scan_stand(flat, a, small_os0(), 1), 0.25F), config);
   const RegistrationResult result =
-      register_icp(target, thin(scan_stand(flat, a, small_os0(), 2)), Pose(), {}, config);
+      register_icp(target, thin(scan_stand(flat, a, small_os0(), 2), 0.25F), Pose(), {}, config);
   ASSERT_TRUE(result.usable());
   EXPECT_EQ(result.degenerate_directions.cols(), 3);
 }
 
 TEST(Icp, SaysWhyItCannot) {
-  const Pair pair = make_pair(4);
+  const ScanPair pair = make_scan_pair(4);
   const IcpConfig config;
   const IcpTarget target(pair.target, config);
   EXPECT_EQ(register_icp(target, Points(5), Pose(), {}, config).status,
@@ -96,7 +74,7 @@ TEST(Icp, SaysWhyItCannot) {
 }
 
 TEST(Icp, SameBitsForAnyNumberOfThreads) {
-  const Pair pair = make_pair(5);
+  const ScanPair pair = make_scan_pair(5);
   RegistrationResult results[2];
   for (int i = 0; i < 2; ++i) {
     with_threads(i + 1, [&] {
@@ -110,7 +88,7 @@ TEST(Icp, SameBitsForAnyNumberOfThreads) {
 
 // Every metric with every kernel finds the motion, with the scale set or estimated.
 TEST(Icp, RecoversKnownMotionsWithAllMetricsAndKernels) {
-  const Pair pair = make_pair(3);
+  const ScanPair pair = make_scan_pair(3);
   const Pose guess =
       pair.truth * Pose::exp((Vector6d() << 0.01, -0.01, 0.02, 0.1, -0.1, 0.05).finished());
   const IcpTarget planes(pair.target, IcpConfig());

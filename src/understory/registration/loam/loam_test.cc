@@ -25,10 +25,7 @@
 namespace understory {
 namespace {
 
-Pose upright(double x, double y, double z, double yaw = 0.0) {
-  return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())),
-          Eigen::Vector3d(x, y, z)};
-}
+using testing::upright;
 
 // P4 (39), worked out term by term.
 TEST(RingFeatures, SmoothnessIsThatOfItsEquation) {

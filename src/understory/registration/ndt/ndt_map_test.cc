@@ -19,7 +19,7 @@ Pose somewhere() {
           Eigen::Vector3d(7, -3, 2)};
 }
 
-Points random_points(std::size_t n, std::uint64_t seed) {
+Points points_in_box(std::size_t n, std::uint64_t seed) {
   Random random(seed);
   Points points;
   for (std::size_t i = 0; i < n; ++i) {
@@ -32,7 +32,7 @@ Points random_points(std::size_t n, std::uint64_t seed) {
 
 // Means and counts of the cells, P4 (40), against a plain computation.
 TEST(NdtMap, CellsHoldTheMeanOfTheirPoints) {
-  const Points points = random_points(20'000, 1);
+  const Points points = points_in_box(20'000, 1);
   NdtMapConfig config;
   config.cell_size_m = 0.7;
   const PlacedCloud cloud{&points, somewhere()};
@@ -86,7 +86,7 @@ TEST(NdtMap, PlanesConstrainAcrossThemOnly) {
 }
 
 TEST(NdtMap, AnEvenlyFilledCellSaysNothing) {
-  const Points points = random_points(200'000, 3);
+  const Points points = points_in_box(200'000, 3);
   const PlacedCloud cloud{&points, Pose()};
   const NdtMapPtr map = build_ndt_map({&cloud, 1}, {});
   double strongest = 0.0;
@@ -259,10 +259,10 @@ TEST(NdtMap, DistributionsWaitUntilTheirPointsHaveGrown) {
 
 TEST(NdtMap, ASnapshotThatSomebodyHoldsDoesNotChange) {
   NdtMapBuilder builder({});
-  builder.insert(random_points(2'000, 5), Pose());
+  builder.insert(points_in_box(2'000, 5), Pose());
   const NdtMapPtr held = builder.snapshot();
   const std::vector<NdtCell> before = held->cells();
-  builder.insert(random_points(2'000, 6), Pose());
+  builder.insert(points_in_box(2'000, 6), Pose());
   NdtMapPtr next = builder.snapshot();
   EXPECT_NE(next, held);
   ASSERT_EQ(held->size(), before.size());
@@ -275,12 +275,12 @@ TEST(NdtMap, ASnapshotThatSomebodyHoldsDoesNotChange) {
 
   const NdtMap* place = next.get();
   next.reset();
-  builder.insert(random_points(100, 7), Pose());
+  builder.insert(points_in_box(100, 7), Pose());
   EXPECT_EQ(builder.snapshot().get(), place);  // nobody held it: no copy
 }
 
 TEST(NdtMap, ForgetsWhatIsFarAway) {
-  const Points points = random_points(20'000, 5);
+  const Points points = points_in_box(20'000, 5);
   NdtMapBuilder builder({});
   builder.insert(points, Pose());
   const NdtMapPtr all = builder.snapshot();

@@ -17,19 +17,9 @@ namespace {
 using testing::make_stand;
 using testing::Pattern;
 using testing::scan_stand;
+using testing::small_os0;
 using testing::Stand;
-
-Pose upright(double x, double y, double z, double yaw = 0.0) {
-  return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())),
-          Eigen::Vector3d(x, y, z)};
-}
-
-Pattern small_os0() {
-  Pattern pattern = testing::os0_128();
-  pattern.rings = 64;
-  pattern.columns = 512;
-  return pattern;
-}
+using testing::upright;
 
 NdtMapPtr map_of(const Points& points, const Pose& pose, double cell_m = 1.0) {
   NdtMapConfig config;
@@ -38,11 +28,11 @@ NdtMapPtr map_of(const Points& points, const Pose& pose, double cell_m = 1.0) {
   return build_ndt_map({&cloud, 1}, config);
 }
 
-struct Error {
+struct PoseError {
   double translation_m;
   double rotation_deg;
 };
-Error error_of(const Pose& estimate, const Pose& truth) {
+PoseError error_of(const Pose& estimate, const Pose& truth) {
   const Vector6d d = right_difference(estimate, truth);
   return {d.tail<3>().norm(), d.head<3>().norm() * 180.0 / M_PI};
 }
@@ -162,7 +152,7 @@ TEST(Ndt, RecoversKnownMotions) {
       config.search = search;
       const RegistrationResult result = register_ndt(*map, source, guess, {}, config);
       EXPECT_EQ(result.status, RegistrationStatus::kConverged) << result.reason;
-      const Error error = error_of(result.target_from_source, b);
+      const PoseError error = error_of(result.target_from_source, b);
       EXPECT_LT(error.translation_m, 0.02);
       EXPECT_LT(error.rotation_deg, 0.15);
       EXPECT_GT(result.inlier_ratio, 0.6);

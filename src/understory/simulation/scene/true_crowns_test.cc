@@ -42,7 +42,7 @@ TEST(TrueCrowns, OutlineOfASquareWithPlacesInsideIsTheSquare) {
   EXPECT_DOUBLE_EQ(polygon_area(convex_outline({})), 0.0);
 }
 
-GrownTree tree_of(Species species) {
+GrownTree tree_of_species(Species species) {
   GrownTree tree;
   tree.species = species;
   tree.dbh_m = 0.2;
@@ -59,7 +59,7 @@ TEST(TrueCrowns, AreaIsThatOfTheLivingCrownSeenFromAbove) {
   const TrueCrowns crowns(config, 5);
   const std::vector<GrownCrown> grown = grow_shapes(config, 5).crowns;
   for (const Species species : {Species::kPine, Species::kSpruce, Species::kBirch}) {
-    const GrownTree tree = tree_of(species);
+    const GrownTree tree = tree_of_species(species);
     const GrownCrown& shape = grown[nearest_crown(grown, tree)];
     const double wide = tree.crown_radius_m / shape.size.crown_radius_m;
     const double high = tree.height_m / shape.size.height_m;
@@ -84,14 +84,14 @@ TEST(TrueCrowns, AreaIsThatOfTheLivingCrownSeenFromAbove) {
 
 TEST(TrueCrowns, VolumeGrowsWithTheSquareOfTheRadiusAndWithTheHeight) {
   const TrueCrowns crowns({}, 5);
-  GrownTree tree = tree_of(Species::kPine);
+  GrownTree tree = tree_of_species(Species::kPine);
   const TrueCrown narrow = crowns.of(tree);
   tree.crown_radius_m *= 2.0;
   EXPECT_NEAR(crowns.of(tree).volume_m3, 4.0 * narrow.volume_m3, 1e-6 * narrow.volume_m3);
 }
 
 TEST(TrueCrowns, BrokenTreesHaveNone) {
-  GrownTree tree = tree_of(Species::kPine);
+  GrownTree tree = tree_of_species(Species::kPine);
   tree.broken_m = 5.0;
   EXPECT_TRUE(std::isnan(TrueCrowns({}, 5).of(tree).area_m2));
 }

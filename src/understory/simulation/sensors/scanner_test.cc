@@ -250,8 +250,8 @@ TEST(Scanner, CountsOfStemReturnsAgreeWithABruteCount) {
 }
 
 // Both ways of casting.
-class ScannerOfRays : public testing::TestWithParam<int> {};
-INSTANTIATE_TEST_SUITE_P(Scanner, ScannerOfRays, testing::Values(3, 8));
+class ScannerOfRays : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Scanner, ScannerOfRays, ::testing::Values(3, 8));
 
 TEST_P(ScannerOfRays, SameBytesForAnyNumberOfThreadsAndAnyOrder) {
   SiteConfig site = quiet_site();

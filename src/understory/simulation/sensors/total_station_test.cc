@@ -11,7 +11,7 @@
 namespace understory {
 namespace {
 
-SiteConfig site(const std::vector<std::string>& more = {}) {
+SiteConfig surveyed_site(const std::vector<std::string>& more = {}) {
   std::vector<std::string> settings = {"seed=31", "duration_s=120"};
   settings.insert(settings.end(), more.begin(), more.end());
   return load_site("tuusniemi1", settings);
@@ -22,7 +22,7 @@ const std::vector<std::string> kExact = {
     "total_station.angle_sd_arcsec=0", "total_station.time_sd_s=0",    "total_station.levelling=0"};
 
 TEST(TotalStation, WithoutErrorsItSeesThePrismOfTheBody) {
-  SimulatedWorld world(site(kExact));
+  SimulatedWorld world(surveyed_site(kExact));
   const auto samples = track_prism(world, 5 * kNsPerSecond, 120.0);
   ASSERT_GT(samples.size(), 300U);
   const std::vector<double>& prism = world.site.total_station.prism_m;
@@ -35,7 +35,7 @@ TEST(TotalStation, WithoutErrorsItSeesThePrismOfTheBody) {
 }
 
 TEST(TotalStation, ErrorsHaveTheirSizeAndALevelledLinkLeavesTheBody) {
-  SimulatedWorld world(site({"total_station.setup_sd_m=0", "total_station.time_sd_s=0"}));
+  SimulatedWorld world(surveyed_site({"total_station.setup_sd_m=0", "total_station.time_sd_s=0"}));
   const TotalStationConfig& config = world.site.total_station;
   double sum = 0.0;
   double apart = 0.0;
@@ -76,7 +76,7 @@ TEST(TotalStation, LosesThePrismBehindTreesAndNeedsAWhile) {
 TEST(TotalStation, IsWrittenBesideTheTruthWhereThereIsOneAndLeavesScansAlone) {
   const test::TemporaryFolder own;
   const std::string folder = own / "station.truth";
-  const SiteConfig with = site({"duration_s=3", "lidar.columns=256"});
+  const SiteConfig with = surveyed_site({"duration_s=3", "lidar.columns=256"});
   SiteConfig without = with;
   without.total_station.enabled = false;
   EXPECT_EQ(site_key(with), site_key(without));  // scans are kept for both

@@ -22,11 +22,11 @@ namespace {
 const std::vector<std::string> kShort = {"duration_s=110", "seed=31", "stand.size_x_m=200",
                                          "stand.size_y_m=80"};
 
-SiteConfig site() {
+SiteConfig harvested_site() {
   return load_site("lieksa1", kShort);
 }
 
-const GrownTree& tree_of(const SimulatedWorld& world, int id) {
+const GrownTree& tree_with_id(const SimulatedWorld& world, int id) {
   return *std::find_if(world.stand.trees.begin(), world.stand.trees.end(),
                        [&](const GrownTree& tree) { return tree.id == id; });
 }
@@ -88,11 +88,11 @@ TEST(Harvest, TheHeadLogHasTheCutsWithItsErrors) {
 }
 
 TEST(Harvest, ATreeIsGoneOnceItIsCutAndItsStumpAndLogsStay) {
-  SimulatedWorld world(site());
+  SimulatedWorld world(harvested_site());
   ASSERT_FALSE(world.plan.harvest.fellings.empty());
   const Felling& felling = world.plan.harvest.fellings.front();
   ASSERT_LT(felling.drop_s, 109.0);
-  const GrownTree& tree = tree_of(world, felling.tree);
+  const GrownTree& tree = tree_with_id(world, felling.tree);
   const Eigen::Vector3d stem = tree.centre(2.0);
   const FallenLog& log = world.plan.harvest.logs.front();
   const Eigen::Vector3d middle = 0.5 * (log.lying.from + log.lying.to);
@@ -124,9 +124,9 @@ TEST(Harvest, ATreeIsGoneOnceItIsCutAndItsStumpAndLogsStay) {
 }
 
 TEST(Harvest, TheTreeIsHeldWhereItGrewThenFallsAndIsFedAndShortens) {
-  SimulatedWorld world(site());
+  SimulatedWorld world(harvested_site());
   const Felling& felling = world.plan.harvest.fellings.front();
-  const GrownTree& tree = tree_of(world, felling.tree);
+  const GrownTree& tree = tree_with_id(world, felling.tree);
   const auto at = [&](double time) { return held_tree(world.plan, felling, tree, time); };
   const HeldTree first = at(felling.grab_s);
   EXPECT_LT((first.world_from_tree.translation() - tree.foot).norm(), 1e-9);
@@ -161,7 +161,7 @@ TEST(Harvest, TheTreeIsHeldWhereItGrewThenFallsAndIsFedAndShortens) {
 }
 
 TEST(Harvest, ScansAcrossAFellingAreTheSameForAnyThreadsAndOrder) {
-  const SiteConfig config = site();
+  const SiteConfig config = harvested_site();
   std::vector<std::int64_t> scans;
   std::vector<ScanReadings> forwards;
   with_threads(1, [&] {
@@ -193,7 +193,7 @@ TEST(Harvest, ScansAcrossAFellingAreTheSameForAnyThreadsAndOrder) {
 TEST(Harvest, TruthSaysWhenTreesWereFelled) {
   const test::TemporaryFolder own;
   const std::string folder = own / "felled.truth";
-  SiteConfig config = site();
+  SiteConfig config = harvested_site();
   Simulator simulator(config);
   simulator.skip(1'000'000);
   simulator.write_truth(folder);

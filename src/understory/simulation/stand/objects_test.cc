@@ -90,7 +90,7 @@ TEST(Objects, VelocityOfAWalkerIsTheChangeOfItsPlace) {
 
 // Points at their true places: on the ground, on the stem of their tree, or on a thing where it is
 // at that time. Both ways of casting.
-class TruePointsTest : public testing::TestWithParam<int> {};
+class TruePointsTest : public ::testing::TestWithParam<int> {};
 
 TEST_P(TruePointsTest, LieOnWhatGaveThem) {
   SimulatedWorld world(site_with_things(GetParam()));
@@ -132,7 +132,7 @@ TEST_P(TruePointsTest, LieOnWhatGaveThem) {
   EXPECT_GT(counts[Surface::kObject], 300);
 }
 
-INSTANTIATE_TEST_SUITE_P(RaysAndBundles, TruePointsTest, testing::Values(1, 4));
+INSTANTIATE_TEST_SUITE_P(RaysAndBundles, TruePointsTest, ::testing::Values(1, 4));
 
 }  // namespace
 }  // namespace understory

@@ -7,14 +7,14 @@
 namespace understory {
 namespace {
 
-struct Sample {
+struct Settings {
   double voxel_size_m = 0.5;
   int count = 3;
   bool enabled = true;
   std::vector<double> gains = {1.0, 2.0};
 };
 
-ConfigTable table_of(Sample& sample) {
+ConfigTable settings_table(Settings& sample) {
   ConfigTable table;
   table.section("map", [&] {
     table.add("voxel_size_m", sample.voxel_size_m, {0.05, 10.0}, "m", "edge of a voxel");
@@ -27,8 +27,8 @@ ConfigTable table_of(Sample& sample) {
 
 // A value that was set to what it was before counts as set, too.
 TEST(ConfigOrigins, RememberWhatSetEachKeyLast) {
-  Sample sample;
-  const ConfigTable table = table_of(sample);
+  Settings sample;
+  const ConfigTable table = settings_table(sample);
   ConfigOrigins origins;
   note_yaml(table, "map: {voxel_size_m: 0.5, deep: {gains: [1, 2]}}\nenabled: true\nother: 1\n",
             "profile x", origins);
@@ -39,8 +39,8 @@ TEST(ConfigOrigins, RememberWhatSetEachKeyLast) {
 }
 
 TEST(ConfigOrigins, ValuesByTheirKeys) {
-  Sample sample;
-  const ConfigTable table = table_of(sample);
+  Settings sample;
+  const ConfigTable table = settings_table(sample);
   set_value(table, "map.count", "7");
   set_value(table, "map.deep.gains", "[3, 0.25]");
   EXPECT_EQ(sample.count, 7);
@@ -50,16 +50,16 @@ TEST(ConfigOrigins, ValuesByTheirKeys) {
 }
 
 TEST(ConfigOrigins, RemarksStandBeforeTheMeaningAndAreReadOver) {
-  Sample sample;
+  Settings sample;
   sample.count = 4;
   const std::string text = yaml_with_remarks(
-      table_of(sample), {{"map.count", "more: it rains"}, {"enabled", "as ever"}});
+      settings_table(sample), {{"map.count", "more: it rains"}, {"enabled", "as ever"}});
   EXPECT_NE(text.find("# more: it rains. how many (default 4, 1..100)\n"), std::string::npos)
       << text;
   EXPECT_NE(text.find("# as ever. whether (default true, true|false)\n"), std::string::npos)
       << text;
-  Sample again;
-  table_of(again).read_yaml(text, "printed");
+  Settings again;
+  settings_table(again).read_yaml(text, "printed");
   EXPECT_EQ(again.count, 4);
 }
 

@@ -16,17 +16,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void put(const fs::path& path) {
+void put_mine(const fs::path& path) {
   fs::create_directories(path.parent_path());
   std::ofstream(path) << "mine";
 }
 
-class OutputGuard : public testing::Test {
+class OutputGuard : public ::testing::Test {
  protected:
   OutputGuard() {
-    put(home_ / "data" / "walk.mcap");
-    put(home_ / "data" / "clouds" / "000000.pcd");
-    put(home_ / "other.mcap");
+    put_mine(home_ / "data" / "walk.mcap");
+    put_mine(home_ / "data" / "clouds" / "000000.pcd");
+    put_mine(home_ / "other.mcap");
   }
   void expect_refused(const fs::path& output, const fs::path& input) const {
     EXPECT_THROW(refuse_input_as_output(output, {input}), RefusedOutput) << output << " " << input;
@@ -68,7 +68,7 @@ TEST_F(OutputGuard, RefusesWhatHoldsAnInput) {
   expect_refused("/", walk_);
   expect_refused(home_ / "data", clouds_);
   // A link to the input is lost with the folder that holds it.
-  put(home_ / "elsewhere" / "notes");
+  put_mine(home_ / "elsewhere" / "notes");
   fs::create_symlink(walk_, home_ / "elsewhere" / "walk.mcap");
   expect_refused(home_ / "elsewhere", home_ / "elsewhere" / "walk.mcap");
 }
@@ -76,7 +76,7 @@ TEST_F(OutputGuard, RefusesWhatHoldsAnInput) {
 TEST_F(OutputGuard, RefusesWhatAnInputFolderLinksTo) {
   fs::create_symlink(home_ / "other.mcap", clouds_ / "part.mcap");
   expect_refused(home_ / "other.mcap", clouds_);
-  put(home_ / "hard.mcap");
+  put_mine(home_ / "hard.mcap");
   fs::create_hard_link(home_ / "hard.mcap", clouds_ / "hard.mcap");
   expect_refused(home_ / "hard.mcap", clouds_);
 }
@@ -113,7 +113,7 @@ TEST_F(OutputGuard, FoldersThatWereMadeGoAgainUnlessTheyAreUsed) {
   EXPECT_FALSE(fs::exists(home_ / "a"));
   {
     const MadeFolders made(home_ / "a" / "b" / "");
-    put(home_ / "a" / "mine");
+    put_mine(home_ / "a" / "mine");
   }
   EXPECT_TRUE(fs::exists(home_ / "a" / "mine"));
   EXPECT_FALSE(fs::exists(home_ / "a" / "b"));

@@ -13,7 +13,7 @@
 namespace understory {
 namespace {
 
-class RecordFileTest : public testing::Test {
+class RecordFileTest : public ::testing::Test {
  protected:
   static std::vector<std::string> all(const std::filesystem::path& path, const RecordCount& known) {
     std::vector<std::string> texts;

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void put(const fs::path& path, const std::string& text) {
+void put_text(const fs::path& path, const std::string& text) {
   std::ofstream(path) << text;
 }
 
@@ -26,11 +26,11 @@ std::string text_of(const fs::path& path) {
 TEST(StagedFile, TheFormerFileStaysUntilTheNewOneIsWhole) {
   const test::TemporaryFolder folder;
   const fs::path path = folder / "stems.csv.gz";
-  put(path, "former");
+  put_text(path, "former");
   StagedFile staged(path, true);
-  put(staged.part(), "half");
+  put_text(staged.part(), "half");
   EXPECT_EQ(text_of(path), "former");
-  put(staged.part(), "whole");
+  put_text(staged.part(), "whole");
   staged.commit();
   EXPECT_EQ(text_of(path), "whole");
   EXPECT_FALSE(fs::exists(staged.part()));
@@ -41,7 +41,7 @@ TEST(StagedFile, WhatFailsLeavesTheFolderAsItWas) {
   const fs::path path = folder / "stems.csv.gz";
   {
     StagedFile staged(path, false);
-    put(staged.part(), "half");
+    put_text(staged.part(), "half");
     EXPECT_FALSE(fs::exists(path));
   }
   EXPECT_TRUE(fs::is_empty(folder.path()));

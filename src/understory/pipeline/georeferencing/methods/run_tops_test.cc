@@ -14,7 +14,7 @@ constexpr double kGround = 140.0;
 
 // A raster of 40 x 30 m, cells of 0.25 m.
 template <typename Height>
-Raster raster_of(Height height) {
+Raster raster_of_heights(Height height) {
   Raster raster;
   raster.x0 = 500.0;
   raster.y0 = -20.0;
@@ -37,9 +37,10 @@ double crowns(double x, double y) {
 
 TEST(RunTops, AreThoseOfTheCanopyInTheWorldFrame) {
   const test::TemporaryFolder folder;
-  write_geotiff(folder / "chm.tif", raster_of(crowns), "");
+  write_geotiff(folder / "chm.tif", raster_of_heights(crowns), "");
   write_geotiff(folder / "dtm.tif",
-                raster_of([](double x, double) { return kGround + 0.1 * (x - 500.0); }), "");
+                raster_of_heights([](double x, double) { return kGround + 0.1 * (x - 500.0); }),
+                "");
   MovableRun run;
   const Pose layer_from_world(so3_exp({0.0, 0.0, 0.7}), {480.0, 10.0, 100.0});
   run.layers = std::make_shared<LayerFrame>(layer_from_world);
@@ -57,7 +58,7 @@ TEST(RunTops, NeedNoTerrainButACanopy) {
   const test::TemporaryFolder folder;
   const MovableRun run;
   EXPECT_TRUE(tops_of_run(folder / "", run).empty());
-  write_geotiff(folder / "chm.tif", raster_of(crowns), "");
+  write_geotiff(folder / "chm.tif", raster_of_heights(crowns), "");
   const std::vector<Tree> tops = tops_of_run(folder / "", run);
   ASSERT_EQ(tops.size(), 2U);
   EXPECT_TRUE(std::isnan(tops[0].z));

@@ -4,12 +4,12 @@
 
 #include <cmath>
 #include <fstream>
-#include <numbers>
 #include <string>
 #include <vector>
 
 #include "understory/recording/captures/hesai/hesai_test_support.h"
 #include "understory/recording/recording_test_support.h"
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -19,17 +19,15 @@ using test::Bytes;
 using test::HesaiPacket;
 using test::kHesaiTime;
 
-constexpr double kRad = std::numbers::pi / 180.0;
-
-void add(HesaiDecoder& decoder, const Bytes& bytes, TimeNs stamp = kHesaiTime) {
+void add_hesai(HesaiDecoder& decoder, const Bytes& bytes, TimeNs stamp = kHesaiTime) {
   decoder.add_packet(bytes.data(), bytes.size(), stamp);
 }
 
 // The points of one packet, in the order of the packet.
-ScanPtr decode_alone(const HesaiPacket& packet, const HesaiConfig& config = {}) {
+ScanPtr decode_hesai_alone(const HesaiPacket& packet, const HesaiConfig& config = {}) {
   Log log;
   HesaiDecoder decoder(config, "test", log);
-  add(decoder, packet.bytes());
+  add_hesai(decoder, packet.bytes());
   decoder.finish();
   return decoder.take_scan();
 }
@@ -81,16 +79,16 @@ TEST(Hesai, DirectionsAndTimesAreThoseOfTheManuals) {
     HesaiPacket packet;
     packet.model = wanted.model;
     packet.azimuth_cdeg = 4'321;
-    const ScanPtr scan = decode_alone(packet);
+    const ScanPtr scan = decode_hesai_alone(packet);
     ASSERT_NE(scan, nullptr);
     const std::size_t channels = hesai_table(wanted.model).channels;
     const ScanPoint& point = scan->points.at((wanted.block - 1) * channels + wanted.channel - 1);
     const double azimuth =
         43.21 + 0.18 * static_cast<double>(wanted.block - 1) + wanted.azimuth_deg;
-    const double flat = 10.0 * std::cos(wanted.elevation_deg * kRad);
-    EXPECT_NEAR(point.x, flat * std::sin(azimuth * kRad), 2e-6);
-    EXPECT_NEAR(point.y, flat * std::cos(azimuth * kRad), 2e-6);
-    EXPECT_NEAR(point.z, 10.0 * std::sin(wanted.elevation_deg * kRad), 2e-6);
+    const double flat = 10.0 * std::cos(wanted.elevation_deg * kDegree);
+    EXPECT_NEAR(point.x, flat * std::sin(azimuth * kDegree), 2e-6);
+    EXPECT_NEAR(point.y, flat * std::cos(azimuth * kDegree), 2e-6);
+    EXPECT_NEAR(point.z, 10.0 * std::sin(wanted.elevation_deg * kDegree), 2e-6);
     EXPECT_EQ(point.ring, wanted.ring);
     EXPECT_EQ(point.intensity, 50.0F);
     EXPECT_NEAR(static_cast<double>(scan->stamp + point.t_ns - kHesaiTime), wanted.us * 1000.0, 1.0)
@@ -103,7 +101,7 @@ TEST(Hesai, DualReturnsOfAFiringShareTheirTime) {
   HesaiPacket packet;
   packet.mode = 0x39;
   packet.other = 3000;
-  const ScanPtr scan = decode_alone(packet);
+  const ScanPtr scan = decode_hesai_alone(packet);
   ASSERT_EQ(scan->points.size(), 4U * 64U);
   EXPECT_EQ(scan->points[0].return_index, 1);  // the less bright
   EXPECT_EQ(scan->points[1].return_index, 0);
@@ -112,9 +110,9 @@ TEST(Hesai, DualReturnsOfAFiringShareTheirTime) {
               1.0);
   EXPECT_NEAR(static_cast<double>(scan->stamp - kHesaiTime), 6'000.0 - 150'000.0, 1.0);
   packet.other = packet.distance;
-  EXPECT_EQ(decode_alone(packet)->points.size(), 4U * 32U);
+  EXPECT_EQ(decode_hesai_alone(packet)->points.size(), 4U * 32U);
   packet.distance = 0;
-  EXPECT_EQ(decode_alone(packet)->points.front().return_index, 0);
+  EXPECT_EQ(decode_hesai_alone(packet)->points.front().return_index, 0);
 }
 
 // A turn of 2000 firings, 250 packets.
@@ -139,7 +137,7 @@ TEST(Hesai, AScanEndsWhereTheHeadPassesNorth) {
   HesaiDecoder decoder({}, "test", log);
   const std::vector<Bytes> packets = turns(510);
   for (int i = 0; i < 510; ++i)
-    add(decoder, packets[static_cast<std::size_t>(i)], stamp_at(i));
+    add_hesai(decoder, packets[static_cast<std::size_t>(i)], stamp_at(i));
   decoder.finish();
   for (const std::size_t points : {64'000U, 64'000U, 2'560U}) {
     const ScanPtr scan = decoder.take_scan();
@@ -168,7 +166,7 @@ TEST(Hesai, NamesPacketsThatAreCutDoubledMissingOrStrange) {
   pandar128[3] = 4;
   packets.push_back(pandar128);
   for (std::size_t i = 0; i < packets.size(); ++i)
-    add(decoder, packets[i], stamp_at(static_cast<int>(i)));
+    add_hesai(decoder, packets[i], stamp_at(static_cast<int>(i)));
   decoder.finish();
   EXPECT_EQ(decoder.take_scan()->points.size(), 9U * 256U);
   const std::string all = test::all_warnings(log);
@@ -216,7 +214,7 @@ TEST(Hesai, UsesTheStampsWhereTheSensorHasNoUtc) {
   HesaiDecoder decoder({}, "test", log);
   const std::vector<Bytes> packets = turns(20);
   for (int i = 0; i < 20; ++i)
-    add(decoder, packets[static_cast<std::size_t>(i)], stamp_at(i) + 5'000 * kNsPerSecond);
+    add_hesai(decoder, packets[static_cast<std::size_t>(i)], stamp_at(i) + 5'000 * kNsPerSecond);
   decoder.finish();
   const TimeNs begin = decoder.take_scan()->stamp;
   EXPECT_NEAR(to_seconds(begin - kHesaiTime), 5'000.0 - 0.000344, 1e-5);
@@ -241,12 +239,12 @@ TEST(Hesai, UsesTheFilesOfTheSensor) {
   EXPECT_EQ(config.calibration.elevation_deg.size(), 32U);
   HesaiPacket packet;
   packet.azimuth_cdeg = 9'000;
-  const ScanPtr scan = decode_alone(packet, config);
+  const ScanPtr scan = decode_hesai_alone(packet, config);
   const ScanPoint& point = scan->points.at(3);  // channel 4: fires 4 us after the block
   // 600 revolutions a minute are 3.6 degrees a millisecond.
-  const double azimuth = (90.0 + 0.5 + 0.0144) * kRad;
-  EXPECT_NEAR(point.x, 10.0 * std::cos(12.25 * kRad) * std::sin(azimuth), 2e-6);
-  EXPECT_NEAR(point.y, 10.0 * std::cos(12.25 * kRad) * std::cos(azimuth), 2e-6);
+  const double azimuth = (90.0 + 0.5 + 0.0144) * kDegree;
+  EXPECT_NEAR(point.x, 10.0 * std::cos(12.25 * kDegree) * std::sin(azimuth), 2e-6);
+  EXPECT_NEAR(point.y, 10.0 * std::cos(12.25 * kDegree) * std::cos(azimuth), 2e-6);
   EXPECT_EQ(point.t_ns, 3'000U);  // the first one fires after 1 us
 }
 
@@ -276,7 +274,7 @@ TEST(Hesai, RefusesWrongCalibrationFiles) {
   Log log;
   HesaiDecoder decoder(config, "walk.pcap", log);
   try {
-    add(decoder, HesaiPacket().bytes());
+    add_hesai(decoder, HesaiPacket().bytes());
     FAIL() << "accepted";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("has 2 channels"), std::string::npos) << error.what();
@@ -294,14 +292,14 @@ TEST(Hesai, GoesOnWhereItWasSaved) {
   HesaiDecoder second({}, "test", log);
   for (int i = 0; i < 400; ++i) {
     const Bytes& packet = packets[static_cast<std::size_t>(i)];
-    add(whole, packet, stamp_at(i));
+    add_hesai(whole, packet, stamp_at(i));
     if (i == 180) {
       BinaryWriter writer;
       first.save(writer);
       BinaryReader reader(writer.bytes(), "test");
       second.load(reader);
     }
-    add(i < 180 ? first : second, packet, stamp_at(i));
+    add_hesai(i < 180 ? first : second, packet, stamp_at(i));
   }
   whole.finish();
   second.finish();
