@@ -239,7 +239,7 @@ TEST(CloudFile, LeavesOutWhatIsFartherThanAnyPlace) {
       "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3\n"
       "HEIGHT 1\nPOINTS 3\nDATA ascii\n1e30 0 0\n1 2 3\n6800000000 2 3\n";
   Log log;
-  const PointCloudFile cloud = read(Bytes(text.begin(), text.end()), log);
+  const PointCloudFile cloud = read_cloud_bytes(Bytes(text.begin(), text.end()), log);
   EXPECT_EQ(cloud.not_finite, 1U);
   ASSERT_EQ(cloud.points.size(), 2U);
   EXPECT_EQ(cloud.points.front(), Eigen::Vector3f(1, 2, 3));

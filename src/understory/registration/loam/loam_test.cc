@@ -306,5 +306,28 @@ TEST(Loam, EdgesCountAcrossTheirLineAndPlanesAlongTheirNormal) {
   EXPECT_NEAR(sums.cost, 0.5 * (across + 0.13 * 0.13) / (0.03 * 0.03), 2.0);
 }
 
+// Walls and a ceiling, and no ground: the two steps alone could move nothing.
+TEST(LoamGround, AllFeaturesCountAtTheEnd) {
+  FeaturePoints room;
+  for (int i = 0; i <= 40; ++i) {
+    for (int k = 0; k <= 40; ++k) {
+      const float a = -2.0F + 0.1F * static_cast<float>(i);
+      const float b = -2.0F + 0.1F * static_cast<float>(k);
+      room.points.emplace_back(a, b, 2.0F);
+      room.points.emplace_back(a, 2.0F, b);
+      room.points.emplace_back(2.0F, a, b);
+    }
+  }
+  room.features.assign(room.points.size(), PointFeature::kPlane);
+  const auto matcher = make_matcher(MatcherConfig(), "loam_ground");
+  const auto builder = matcher->make_builder({});
+  builder->insert_features(room, Pose(), std::nullopt);
+  const Pose guess = upright(0.05, -0.05, 0.05, 0.005);
+  const RegistrationResult result =
+      builder->snapshot()->match_features(room, guess, {}, MatchStart::kNear);
+  EXPECT_TRUE(result.usable()) << result.reason;
+  EXPECT_LT(result.target_from_source.translation().norm(), 0.005);
+}
+
 }  // namespace
 }  // namespace understory
