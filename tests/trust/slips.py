@@ -37,13 +37,18 @@ def unknown(folder):
     assert program("--version").returncode == 0
 
 
+def plain(*words):
+    """The program without options before its command: `help` is the first word."""
+    return subprocess.run([PROGRAM, *words], capture_output=True, text=True)
+
+
 @cases.case("help as a command, and a command that was left out")
 def asked(folder):
     for words, page in ((("help",), ("--help",)), (("help", "map"), ("map", "--help")),
                         (("help", "calibrate", "imu"), ("calibrate", "imu", "--help"))):
-        done = program(*words)
-        assert done.returncode == 0 and done.stdout and done.stdout == program(*page).stdout, done
-    assert "did you mean 'map'" in program("help", "mpa").stderr
+        done = plain(*words)
+        assert done.returncode == 0 and done.stdout and done.stdout == plain(*page).stdout, done
+    assert "did you mean 'map'" in plain("help", "mpa").stderr
     for words, commands in (((), "demo, map, correct"), (("calibrate",), "imu, lidar-imu, lidars")):
         done = program(*words)
         assert done.returncode == 2 and f"expected a command: {commands}" in done.stderr, done
