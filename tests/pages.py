@@ -1,5 +1,6 @@
 """Pages: links lead somewhere, every page is reached, and commands, options and settings exist. No
-sentence has more than 25 words, and pages for users name papers by their titles."""
+sentence has more than 25 words, and pages for users name papers by their titles. The commands of a
+guide work one after the other, and a long page begins with a list of its sections."""
 
 import os
 import re
@@ -9,6 +10,7 @@ from pathlib import Path
 TOP = Path(__file__).resolve().parent.parent
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 LONGEST_SENTENCE = 25
+LONGEST_WITHOUT_LIST = 1500  # words of a page
 wrong = []
 
 
@@ -67,11 +69,21 @@ def commands(page):
             yield found[1].replace("'", "").split()
 
 
+def commands_in_sentences(page):
+    """Those between back quotes, which a line may break."""
+    text = re.sub(r"^    .*$", "", page.read_text(), flags=re.M)
+    for found in re.findall(r"`(?:build/)?understory\s+([a-z][^`]*)`", text):
+        yield re.sub(r"[\[\]]|\|\S+", "", found).split()
+
+
 def check_command(page, words, helps, keys):
     command = words[0]
     if command not in helps:
         wrong.append(f"{page.name}: no command {command}")
         return
+    # What names the folder to write is a whole command, and no mere mention of an option.
+    lacks = needed[command] - set(words) if "-o" in words else set()
+    wrong.extend(f"{page.name}: {' '.join(words)}: lacks {option}" for option in sorted(lacks))
     for at, word in enumerate(words):
         if word.startswith("--") and word not in helps[command]:
             wrong.append(f"{page.name}: {command} has no option {word}")
@@ -109,6 +121,9 @@ wrong += [f"{page.relative_to(TOP)}: no page leads to it" for page in sorted(pag
 
 names = re.findall(r"^  ([a-z]+) ", printed("--help").split("Subcommands:")[1], re.M)
 helps = {name: printed(name, "--help") for name in names}
+needed = {name: set(re.findall(r"^  (--\S+) .*\bREQUIRED", text, re.M)) for name, text in helps.items()}
+assert "--method" in needed["georeference"], needed
+helps["help"], needed["help"] = "", set()
 helps["evaluate"] += printed("evaluate", "trees", "--help") + printed("evaluate", "map", "--help")
 helps["calibrate"] += printed("calibrate", "lidars", "--help")
 keys = {"map": keys_of("map"), "map by stems": keys_of("map", "--front-end", "sparse"),
@@ -120,7 +135,26 @@ for page in [first, *guides, *sorted((TOP / "docs" / "reference").glob("*.md"))]
     for words in commands(page):
         check_command(page, words, helps, keys)
         checked += 1
-assert checked > 20, checked
+    for words in commands_in_sentences(page):
+        check_command(page, words, helps, keys)
+        checked += 1
+assert checked > 60, checked
+
+# A folder that holds a run is refused: two commands of a guide never write the same one.
+for page in guides:
+    written = [words[words.index("-o") + 1] for words in commands(page) if "-o" in words]
+    wrong += [f"{page.name}: two commands write {name}" for name in set(written) if written.count(name) > 1]
+
+# What a page says before its first section leads to all of them.
+for page in sorted((TOP / "docs" / "reference").glob("*.md")):
+    before, *sections = re.split(r"^## ", page.read_text(), flags=re.M)
+    if len(page.read_text().split()) < LONGEST_WITHOUT_LIST:
+        continue
+    for section in sections:
+        head = section.split("\n", 1)[0].lower()
+        anchor = re.sub(r"[^\w\- ]", "", head).replace(" ", "-")
+        if f"](#{anchor})" not in before:
+            wrong.append(f"{page.name}: its beginning does not lead to the section {head}")
 
 counted = 0
 for page in sorted(pages | {TOP / "CHANGELOG.md"}):
@@ -142,6 +176,15 @@ for words in (["map"], ["map", "--front-end", "sparse"], ["correct"], ["inventor
 for where, text in said.items():
     for found in re.finditer(r"\bP[0-4]\b.{0,20}|.{0,20}[ (]\(\d+\)", text):
         wrong.append(f"{where}: a paper without its title, or an equation: {found[0]}")
+
+# Abbreviations of the pages that are read first are in the glossary. These are names of a maker and of a file.
+NAMES = {"AMD", "LICENSE", "RUN", "RECORDING"}
+glossary = (TOP / "docs" / "reference" / "terms.md").read_text()
+for page in [first, *guides]:
+    plain = re.sub(r"`[^`]*`|\]\([^)]*\)", "", text_of(page))
+    for word in sorted(set(re.findall(r"(?<![\w.-])[A-Z][A-Z0-9]+(?![\w-])", plain)) - NAMES):
+        if not re.search(rf"\b{word}\b", glossary):
+            wrong.append(f"{page.relative_to(TOP)}: {word} is not in the glossary")
 
 # Settings (their last parts do) and kinds of warnings that a page names exist.
 FILES = r"csv|gz|tum|json|html|laz|las|tif|gpkg|yaml|mcap|md|h|cc|py|pcap|nmea|qgs|txt|sh|bin|g2o|truth|sensor"

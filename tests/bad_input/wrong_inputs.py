@@ -28,13 +28,13 @@ def refused(code, *arguments):
 def run_as_recording(folder):
     for recording in (RUN, f"{RUN}/"):
         said = refused(3, "map", recording, "-o", folder / "a")
-        assert f"understory inventory {RUN}/map.laz" in said, said
+        assert f"understory inventory {recording} -o DIR" in said, said
     assert not (folder / "a").exists()
-    unfinished = folder / "unfinished"
-    shutil.copytree(RUN, unfinished)
-    (unfinished / "map.laz").unlink()
-    said = refused(3, "map", unfinished, "-o", folder / "a")
-    assert f"map --resume {unfinished}" in said, said
+    bare = folder / "bare"  # as a run by stems, which makes no cloud
+    shutil.copytree(RUN, bare)
+    (bare / "map.laz").unlink()
+    said = refused(3, "map", bare, "-o", folder / "a")
+    assert f"{bare}/run.json" in said and "--resume" not in said, said
     clouds = folder / "clouds"  # of someone who keeps notes of other programs beside the scans
     shutil.copytree(CLOUDS, clouds)
     (clouds / "run.json").write_text("{}")

@@ -37,6 +37,38 @@ def unknown(folder):
     assert program("--version").returncode == 0
 
 
+def plain(*words):
+    """The program without options before its command: `help` is the first word."""
+    return subprocess.run([PROGRAM, *words], capture_output=True, text=True)
+
+
+@cases.case("help as a command, and a command that was left out")
+def asked(folder):
+    for words, page in ((("help",), ("--help",)), (("help", "map"), ("map", "--help")),
+                        (("help", "calibrate", "imu"), ("calibrate", "imu", "--help"))):
+        done = plain(*words)
+        assert done.returncode == 0 and done.stdout and done.stdout == plain(*page).stdout, done
+    assert "did you mean 'map'" in plain("help", "mpa").stderr
+    for words, commands in (((), "demo, map, correct"), (("calibrate",), "imu, lidar-imu, lidars")):
+        done = program(*words)
+        assert done.returncode == 2 and f"expected a command: {commands}" in done.stderr, done
+    assert "understory evaluate trees --help" in program("evaluate", "trees", "a").stderr
+    done = program("map", "walk.mcap")
+    assert done.returncode == 2 and "understory map walk.mcap -o RUN" in done.stderr, done
+    done = program("inventory", "plot.laz")
+    assert done.returncode == 2 and "understory inventory plot.laz -o DIR" in done.stderr, done
+
+
+@cases.case("a setting of another command is named as this one calls it")
+def settings(folder):
+    for words, setting, meant in ((("map", "x.mcap", "-o", folder / "run"), "curves.species=pine", "inventory.curves.species"),
+                                  (("inventory", "x.laz", "-o", folder / "run"), "inventory.stems.min_dbh_m=0.1", "stems.min_dbh_m")):
+        done = program(*words, "--set", setting)
+        assert done.returncode == 2 and f"did you mean {meant}?" in done.stderr, done
+    done = program("map", "sim:demo?sed=4", "-o", folder / "run")
+    assert done.returncode == 2 and "sim:demo?sed: unknown key (did you mean seed?)" in done.stderr, done
+
+
 @cases.case("an unknown option is named, and the nearest one proposed")
 def options(folder):
     for command, typed, meant in (("map", "--sett", "--set"), ("map", "--overwirte", "--overwrite"),
@@ -44,6 +76,8 @@ def options(folder):
         done = program(command, "x.mcap", "-o", folder / "run", typed, "a=b")
         assert done.returncode == 2 and done.stderr.startswith("error: "), done
         assert f"'{typed.split('=')[0]}'" in done.stderr and f"did you mean '{meant}'" in done.stderr, done
+    done = program("calibrate", "imu", "x.mcap", "-o", folder / "run", "--facotr", "2")
+    assert done.returncode == 2 and "calibrate imu has no option" in done.stderr and "'--factor'" in done.stderr, done
     done = program("map", "x.mcap", "y.mcap", "z.mcap")
     assert done.returncode == 2 and "z.mcap" in done.stderr, done
 
@@ -71,6 +105,10 @@ def other_way(folder):
     walk.write_bytes(b"\x89MCAP0\r\n")
     clouds = folder / "clouds"
     clouds.mkdir()
+    for words in (("merge", walk, clouds, "-o", folder / "both"), ("evaluate", walk, clouds), ("evaluate", "trees", clouds, walk),
+                  ("evaluate", "map", walk), ("correct", walk, "-o", folder / "both")):
+        done = program(*words)
+        assert done.returncode == 3 and f"is a recording: map it first with `understory map {walk}" in done.stderr, done
     for recording in (walk, clouds, "sim:demo"):
         done = program("inventory", recording, "-o", folder / "plot")
         assert done.returncode == 3 and f"understory map {recording}" in done.stderr, done
@@ -91,6 +129,22 @@ def arms(folder):
     assert done.returncode == 0 and "put the IMU 3" in done.stdout, done
     outcome = map_recording(GOOD, folder / "run", "--extrinsics", extrinsics)
     assert "recording.lever_arm" in outcome.warnings, outcome.warnings.keys()
+    assert "[recording.lever_arm]" in outcome.said, outcome.said  # what the page of warnings lists
+
+
+@cases.case("a run is no recording for info and convert either")
+def run_for_recording(folder):
+    assert program("map", GOOD, "-o", folder / "run").returncode == 0
+    out = folder / "out"
+    for words in (("info", folder / "run"), ("convert", folder / "run", out), ("convert", folder / "run", folder / "out.mcap"),
+                  ("convert", folder / "run", folder / "out.csv.gz"), ("map", folder / "run", "-o", out)):
+        done = program(*words)
+        assert done.returncode == 3 and f"understory inventory {folder / 'run'} -o DIR" in done.stderr, done
+    assert not list(folder.glob("out*"))
+    done = program("map", "--resume", folder / "run")
+    assert done.returncode == 3 and "is finished" in done.stderr and "report.html" in done.stderr, done
+    done = program("map", "--resume", out)
+    assert done.returncode == 3 and "no unfinished run" in done.stderr and "no such folder" in done.stderr, done
 
 
 @cases.case("rates in degrees a second, beyond what any sensor tells in radians")

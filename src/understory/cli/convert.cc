@@ -12,6 +12,7 @@
 #include "understory/cli/convert_layers.h"
 #include "understory/cli/convert_stems.h"
 #include "understory/cli/open_options.h"
+#include "understory/cli/suggestion.h"
 #include "understory/output/clouds/las_writer.h"
 #include "understory/pipeline/source.h"
 #include "understory/recording/bags/mcap_writer.h"
@@ -189,6 +190,7 @@ int run_convert(const ConvertOptions& options, CommandContext& context) {
     conversion.overwrite = options.overwrite;
     return convert_layers(conversion, context);
   }
+  refuse_run(options.input);
   refuse_input_as_output(options.output, files_of(options.input, options.open));
   if (is_stems_file(options.output))
     return convert_to_stems(options.input, options.output, options.open, options.overwrite,

@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <string>
-#include <vector>
 
 #include "understory/output/database/postgis.h"
 #include "understory/output/geojson.h"
@@ -29,15 +28,6 @@ fs::path folder_of(const std::string& input) {
   return given.parent_path().empty() ? fs::path(".") : given.parent_path();
 }
 
-// The GeoPackages of a run: its trees and path, and crowns and plots where there are any.
-std::vector<fs::path> packages_of(const std::string& input) {
-  std::vector<fs::path> packages = {file_in_folder(input, "trees.gpkg")};
-  if (!fs::is_directory(input)) return packages;
-  for (const char* name : {"crowns.gpkg", "plots.gpkg"})
-    if (fs::exists(fs::path(input) / name)) packages.push_back(fs::path(input) / name);
-  return packages;
-}
-
 // The same recordings by the same command are the same run, wherever its folder lies.
 std::string run_id_of(const fs::path& folder) {
   const RunJson json(folder);
@@ -59,7 +49,7 @@ int convert_to_database(const LayerConversion& conversion, CommandContext& conte
   PostgisRequest request;
   request.target = conversion.target.substr(std::string(kDatabase).size());
   request.schema = conversion.schema;
-  request.packages = packages_of(conversion.input);
+  request.packages = {file_in_folder(conversion.input, "trees.gpkg")};
   request.run_id = conversion.run_id.empty() ? run_id_of(folder) : conversion.run_id;
   request.run_name = fs::weakly_canonical(folder).filename().string();
   request.version = kVersion;

@@ -3,6 +3,7 @@
 
 #include "understory/cli/command.h"
 #include "understory/cli/outcome.h"
+#include "understory/cli/suggestion.h"
 #include "understory/pipeline/correction/correction.h"
 #include "understory/util/error.h"
 #include "understory/util/files/output_guard.h"
@@ -31,6 +32,7 @@ int run_correct(const CorrectOptions& options, CommandContext& context) {
   }
   if (options.stems.empty() || options.run_folder.empty())
     throw ConfigError({"understory correct needs STEMS.csv.gz or a run, and -o RUN"});
+  refuse_unmapped(options.stems, " --front-end sparse");
   refuse_input_as_output(options.run_folder, {options.config_file});
   request.stems = options.stems;
   request.run_folder = options.run_folder;

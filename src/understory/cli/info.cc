@@ -5,6 +5,7 @@
 
 #include "understory/cli/command.h"
 #include "understory/cli/open_options.h"
+#include "understory/cli/suggestion.h"
 #include "understory/pipeline/source.h"
 #include "understory/recording/recording_info.h"
 
@@ -210,6 +211,7 @@ void print_text(const RecordingInfo& info) {
 }
 
 int run_info(const InfoOptions& options, CommandContext& context) {
+  refuse_run(options.recording);
   Log log;  // its warnings are part of the result
   const std::unique_ptr<Recording> recording = open_source(options.recording, options.open, log);
   RecordingSurvey survey;

@@ -57,7 +57,11 @@ int run(const InventoryOptions& options, CommandContext& context) {
     return kExitDone;
   }
   if (request.cloud.empty() || request.run_folder.empty()) {
-    throw ConfigError({"inventory needs a cloud (or run folder) and -o DIR; see --help"});
+    throw ConfigError({request.cloud.empty()
+                           ? "inventory needs a cloud (or run folder) and -o DIR, the folder to "
+                             "write (understory inventory --help)"
+                           : "inventory needs -o DIR, the folder to write: `understory inventory " +
+                                 request.cloud + " -o DIR`"});
   }
   refuse_recording(request.cloud);
   if (request.copc && (request.slice || request.config.extent == InventoryExtent::kBasic))

@@ -69,10 +69,36 @@ void check_finite(const CLI::App& command) {
     check_finite(*chosen);
 }
 
+std::string names_of_commands(const CLI::App& app) {
+  std::string list;
+  for (const CLI::App* command : app.get_subcommands({}))
+    list += (list.empty() ? "" : ", ") + command->get_name();
+  return list;
+}
+
+// The commands that were named, one below the other.
+struct Chosen {
+  std::vector<const CLI::App*> commands;  // the program first
+  std::string name;                       // "evaluate trees"; empty where none was named
+};
+
+Chosen chosen_of(const CLI::App& app) {
+  Chosen chosen{{&app}, ""};
+  while (!chosen.commands.back()->get_subcommands().empty()) {
+    chosen.commands.push_back(chosen.commands.back()->get_subcommands().front());
+    chosen.name += (chosen.name.empty() ? "" : " ") + chosen.commands.back()->get_name();
+  }
+  return chosen;
+}
+
+std::string help_of(const Chosen& chosen) {
+  return " (understory " + chosen.name + (chosen.name.empty() ? "--help)" : " --help)");
+}
+
 // The parser only says that a command is missing. Empty if one is named or none is tried.
-std::string unknown_command(const CLI::App& app, int argc, char** argv) {
-  for (int k = 1; k < argc; ++k) {
-    const std::string word = argv[k];
+std::string unknown_command(const CLI::App& app, const std::vector<const char*>& words) {
+  for (std::size_t k = 1; k < words.size(); ++k) {
+    const std::string word = words[k];
     if (word == "--threads") ++k;  // and its value
     if (word.empty() || word.front() == '-') continue;
     std::vector<std::string> names;
@@ -80,11 +106,9 @@ std::string unknown_command(const CLI::App& app, int argc, char** argv) {
       names.push_back(command->get_name());
     if (std::find(names.begin(), names.end(), word) != names.end()) return {};
     const std::string meant = nearest_word(word, names);
-    std::string list;
-    for (const std::string& name : names)
-      list += (list.empty() ? "" : ", ") + name;
     return "there is no command '" + word + "'" +
-           (meant.empty() ? "; the commands are: " + list : "; did you mean '" + meant + "'?") +
+           (meant.empty() ? "; the commands are: " + names_of_commands(app)
+                          : "; did you mean '" + meant + "'?") +
            " (understory --help)";
   }
   return {};
@@ -92,33 +116,43 @@ std::string unknown_command(const CLI::App& app, int argc, char** argv) {
 
 // The first option that the command does not have, and the nearest one that it has; empty if each
 // is known.
-std::string unknown_option(const CLI::App& app, int argc, char** argv) {
-  const auto chosen = app.get_subcommands();
-  const CLI::App& command = chosen.empty() ? app : *chosen.front();
+std::string unknown_option(const CLI::App& app, const std::vector<const char*>& words) {
+  const Chosen chosen = chosen_of(app);
   std::vector<std::string> names;
-  for (const CLI::App* each : {&app, &command}) {
+  for (const CLI::App* each : chosen.commands) {
     for (const CLI::Option* option : each->get_options()) {
       for (const std::string& name : option->get_lnames())
         names.push_back("--" + name);
     }
   }
-  for (int k = 1; k < argc; ++k) {
-    const std::string word = std::string(argv[k]).substr(0, std::string(argv[k]).find('='));
+  for (std::size_t k = 1; k < words.size(); ++k) {
+    const std::string given = words[k];
+    const std::string word = given.substr(0, given.find('='));
     if (word.rfind("--", 0) != 0 || std::find(names.begin(), names.end(), word) != names.end())
       continue;
     const std::string meant = nearest_word(word, names);
-    return command.get_name() + " has no option '" + word + "'" +
-           (meant.empty() ? "" : "; did you mean '" + meant + "'?") + " (understory " +
-           command.get_name() + " --help)";
+    return (chosen.name.empty() ? "understory" : chosen.name) + " has no option '" + word + "'" +
+           (meant.empty() ? "" : "; did you mean '" + meant + "'?") + help_of(chosen);
   }
   return {};
 }
 
 // What the parser says, as the program's own messages are: with the page that helps.
 std::string with_help(const CLI::App& app, const std::string& said) {
-  const auto chosen = app.get_subcommands();
-  const std::string name = chosen.empty() ? "" : chosen.front()->get_name() + " ";
-  return said + " (understory " + name + "--help)";
+  const Chosen chosen = chosen_of(app);
+  const CLI::App& last = *chosen.commands.back();
+  const bool lacks_command = last.get_require_subcommand_min() > 0;
+  return (lacks_command ? "expected a command: " + names_of_commands(last) : said) +
+         help_of(chosen);
+}
+
+// "help map" is "map --help".
+std::vector<const char*> with_help_as_option(int argc, char** argv) {
+  std::vector<const char*> words(argv, argv + argc);
+  if (words.size() < 2 || std::string(words[1]) != "help") return words;
+  words.erase(words.begin() + 1);
+  words.push_back("--help");
+  return words;
 }
 
 int run(int argc, char** argv) {
@@ -148,13 +182,15 @@ int run(int argc, char** argv) {
   add_merge_command(app, chosen);
   add_georeference_command(app, chosen);
   add_calibrate_command(app, chosen);
-  if (const std::string complaint = unknown_command(app, argc, argv); !complaint.empty())
+  app.footer("`understory COMMAND --help` shows the options of a command, with an example.");
+  const std::vector<const char*> words = with_help_as_option(argc, argv);
+  if (const std::string complaint = unknown_command(app, words); !complaint.empty())
     return complain(kExitUsage, complaint);
   try {
-    app.parse(argc, argv);
+    app.parse(static_cast<int>(words.size()), words.data());
     check_finite(app);
   } catch (const CLI::ExtrasError& error) {
-    const std::string complaint = unknown_option(app, argc, argv);
+    const std::string complaint = unknown_option(app, words);
     return complain(kExitUsage, complaint.empty() ? with_help(app, error.what()) : complaint);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) return complain(kExitUsage, with_help(app, error.what()));

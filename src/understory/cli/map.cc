@@ -147,7 +147,11 @@ int run_map(const MapOptions& options, CommandContext& context) {
       options.front_end, options.profile, options.config_file, settings, context.log);
   if (options.print_config) return print_config(options, read, context);
   if (options.recording.empty() || options.run_folder.empty()) {
-    throw ConfigError({"understory map needs a RECORDING and -o RUN (or --resume RUN)"});
+    throw ConfigError(
+        {options.recording.empty()
+             ? "map needs a RECORDING and -o RUN, the folder to write (or --resume RUN)"
+             : "map needs -o RUN, the folder to write: `understory map " + options.recording +
+                   " -o RUN`"});
   }
   MappingRequest request;
   request.recording = options.recording;
@@ -215,7 +219,7 @@ void add_map_command(CLI::App& app, Command& chosen) {
       "values that would run on it, and why");
   add_open_options(*command, options->open);
   command->footer(
-      "Example:\n  understory map plot7.mcap -o plot7 --profile handheld\n"
+      "Examples:\n  understory map plot7.mcap -o plot7 --profile handheld\n"
       "  understory map 'sim:handheld?seed=3' -o run --set loop_closure.enabled=false\n"
       "  understory map sim:lieksa2 -o forest --front-end sparse");
   command->callback([&chosen, options, command] {

@@ -3,6 +3,7 @@
 
 #include "understory/cli/command.h"
 #include "understory/cli/outcome.h"
+#include "understory/cli/suggestion.h"
 #include "understory/pipeline/merging/tree_map_merging.h"
 
 namespace understory {
@@ -40,6 +41,8 @@ nlohmann::ordered_json to_json(const MergeOutcome& outcome, double weight) {
 }
 
 int merge(const MergeOptions& options, CommandContext& context) {
+  for (const std::string& map : {options.request.a, options.request.b})
+    refuse_unmapped(map);
   const MergeOutcome outcome = run_merging(options.request, context.log, context.until_stopped());
   if (!options.json) return report_outcome(outcome);
   return report_outcome(to_json(outcome, options.request.weight).dump(2), outcome.status,

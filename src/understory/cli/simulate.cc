@@ -216,7 +216,8 @@ int run_simulate(SimulateOptions options, CommandContext& context) {
   if (!options.duration_s.empty()) options.settings.push_back("duration_s=" + options.duration_s);
   if (options.keys) return print_keys(options);
   if (options.site.empty() || options.output.empty()) {
-    context.log.error("expected a site and -o REC.mcap (or --list, --print-site)");
+    context.log.error(
+        "expected SITE and -o REC.mcap: --list names the sites, --print-site their keys");
     return kExitUsage;
   }
   return simulate(options, context);
@@ -227,7 +228,7 @@ int run_simulate(SimulateOptions options, CommandContext& context) {
 void add_simulate_command(CLI::App& app, Command& chosen) {
   auto options = std::make_shared<SimulateOptions>();
   CLI::App* command = app.add_subcommand("simulate", "Scan a simulated forest into a recording");
-  command->add_option("site", options->site, "Name of a shipped site, or a site's YAML file");
+  command->add_option("SITE", options->site, "Name of a shipped site, or a site's YAML file");
   command->add_option("-o,--output", options->output,
                       "Recording to write: REC.mcap, or REC.pcap for a VLP-16");
   command->add_flag("--overwrite", options->overwrite,

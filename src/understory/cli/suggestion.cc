@@ -44,6 +44,11 @@ bool ends_with_one_of(const std::string& name, const std::vector<std::string>& e
                      [&](const std::string& ending) { return small.ends_with(ending); });
 }
 
+bool names_recording(const std::string& given) {
+  return given.starts_with("sim:") ||
+         ends_with_one_of(given, {".mcap", ".bag", ".db3", ".pcap", ".pcapng"});
+}
+
 // The one cloud of a folder that holds no other scans; empty if there is none, or are several.
 std::string single_cloud(const std::string& folder) {
   if (is_ros2_bag_folder(folder)) return {};
@@ -61,23 +66,27 @@ std::string single_cloud(const std::string& folder) {
   return found;
 }
 
-// Error if the folder is that of a run, whose map would be taken for a scan.
-void refuse_run(const std::string& folder) {
-  const bool unfinished = holds_unfinished_run(folder);
-  if (!unfinished && !RunJson(folder).is_ours()) return;
+}  // namespace
+
+void refuse_run(const std::string& recording) {
   std::error_code ignored;
-  const fs::path cloud = fs::path(folder) / "map.laz";
+  if (!fs::is_directory(recording, ignored)) return;
+  const bool unfinished = holds_unfinished_run(recording);
+  if (!unfinished && !RunJson(recording).is_ours()) return;
+  const fs::path cloud = fs::path(recording) / "map.laz";
   const bool has_cloud = fs::exists(cloud, ignored);
   std::string advice;
   if (has_cloud)
-    advice = "`understory inventory " + cloud.string() + " -o DIR` measures the trees of its map";
-  if (unfinished || !has_cloud)
+    advice = "`understory inventory " + (unfinished ? cloud.string() : recording) +
+             " -o DIR` measures the trees of its map";
+  else if (!unfinished)
+    advice = "its results and the recording that it was made of stand in " +
+             (fs::path(recording) / RunJson::kName).string();
+  if (unfinished)
     advice += (advice.empty() ? "" : ", ") +
-              ("`understory map --resume " + folder + "` goes on with a run that is not finished");
-  throw InputError(folder, "", "is the folder of a run, no recording: " + advice);
+              ("`understory map --resume " + recording + "` goes on with it");
+  throw InputError(recording, "", "is the folder of a run, no recording: " + advice);
 }
-
-}  // namespace
 
 std::string nearest_word(const std::string& given, const std::vector<std::string>& words) {
   std::string best;
@@ -112,9 +121,7 @@ void refuse_cloud(const std::string& recording) {
 void refuse_recording(const std::string& cloud) {
   std::error_code ignored;
   const bool folder = fs::is_directory(cloud, ignored) && !fs::exists(fs::path(cloud) / "map.laz");
-  if (!folder && !cloud.starts_with("sim:") &&
-      !ends_with_one_of(cloud, {".mcap", ".bag", ".db3", ".pcap", ".pcapng"}))
-    return;
+  if (!folder && !names_recording(cloud)) return;
   throw InputError(cloud, "",
                    folder
                        ? "expected a point cloud, or a run folder with a map.laz in it; a folder "
@@ -122,6 +129,14 @@ void refuse_recording(const std::string& cloud) {
                              cloud + " -o RUN`"
                        : "is a recording, no point cloud: map it first with `understory map " +
                              cloud + " -o RUN`, then give RUN");
+}
+
+void refuse_unmapped(const std::string& given, const std::string& options) {
+  std::error_code ignored;
+  if (!names_recording(given) || fs::is_directory(given, ignored)) return;
+  throw InputError(given, "",
+                   "is a recording: map it first with `understory map " + given + " -o RUN" +
+                       options + "`, then give RUN");
 }
 
 }  // namespace understory

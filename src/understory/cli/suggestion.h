@@ -13,7 +13,12 @@ namespace understory {
 // Error if `recording` is one point cloud, a folder with one, or the folder of a run, finished or
 // not. They make no map: the error names the command that takes them.
 void refuse_cloud(const std::string& recording);
+// Error if `recording` is the folder of a run, finished or not: its map would be taken for a scan.
+void refuse_run(const std::string& recording);
 // Error if `cloud` is a recording, which has to be mapped first.
 void refuse_recording(const std::string& cloud);
+// The same where a run or one of its files is expected. `options` are those of `map` that make what
+// is needed.
+void refuse_unmapped(const std::string& given, const std::string& options = "");
 
 }  // namespace understory

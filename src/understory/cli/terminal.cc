@@ -97,7 +97,9 @@ class ProgressLine {
   static std::string text(const ProgressReport& report, const Stage& stage, double elapsed) {
     std::string line = report.stage;
     if (report.total > 0.0) line += fmt::format(" {:3.0f} %", 100.0 * report.done / report.total);
-    line += report.unit.empty() ? " ..." : fmt::format("  {:.0f} {}", report.done, report.unit);
+    if (report.unit.empty()) line += " ...";
+    const bool said = report.unit.empty() || (report.unit == "%" && report.total > 0.0);
+    if (!said) line += fmt::format("  {:.0f} {}", report.done, report.unit);
     const double rate = elapsed > 0.5 ? (report.done - stage.start_done) / elapsed : 0.0;
     if (rate > 0.0) {
       line += fmt::format("  {:.1f}/s", rate);

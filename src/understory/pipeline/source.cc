@@ -95,7 +95,9 @@ std::vector<std::filesystem::path> files_of(const std::string& recording,
     return files;
   }
   const SimulationUri uri = parse_simulation_uri(recording);
-  for (const std::string& file : site_files(uri.site, site_settings(uri)))
+  const auto named =
+      with_problems_of(uri, [&] { return site_files(uri.site, site_settings(uri)); });
+  for (const std::string& file : named)
     files.emplace_back(file);
   return files;
 }

@@ -124,7 +124,8 @@ class RecordingSurvey::Impl {
     for (const Log::Warning& warning : log.warnings())
       info.warnings.push_back(
           warning.first_message +
-          (warning.count > 1 ? " (" + std::to_string(warning.count) + " such)" : ""));
+          (warning.count > 1 ? " (" + std::to_string(warning.count) + " such)" : "") + " [" +
+          warning.key + "]");
     warn_of_lidar(info);
     warn_of_imu(info);
     warn_of_rest(info);

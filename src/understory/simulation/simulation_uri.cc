@@ -2,8 +2,6 @@
 
 #include <cstddef>
 
-#include "understory/util/error.h"
-
 namespace understory {
 
 bool is_simulation_uri(const std::string& text) {
@@ -25,6 +23,16 @@ SimulationUri parse_simulation_uri(const std::string& text) {
     start = end;
   }
   return uri;
+}
+
+void rethrow_of_uri(const SimulationUri& uri, const ConfigError& error) {
+  const std::string option = "--set ";
+  std::vector<std::string> problems = error.problems();
+  for (std::string& problem : problems) {
+    if (problem.starts_with(option))
+      problem = "sim:" + uri.site + "?" + problem.substr(option.size());
+  }
+  throw ConfigError(problems);
 }
 
 }  // namespace understory

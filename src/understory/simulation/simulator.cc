@@ -435,7 +435,7 @@ std::unique_ptr<Simulator> open_simulation(const std::string& uri, Log& log,
       settings.push_back(setting);
     }
   }
-  const SiteConfig site = load_site(parts.site, settings);
+  const SiteConfig site = with_problems_of(parts, [&] { return load_site(parts.site, settings); });
   if (site.truth.points) {
     throw ConfigError(
         {"truth.points: only `understory simulate` writes points.laz; simulate a "

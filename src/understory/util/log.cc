@@ -14,7 +14,8 @@ void Log::warn(const std::string& key, const std::string& message) {
     }
     count = ++warning.count;
   }
-  if (count <= kPassedOn) pass(LogLevel::kWarning, message);
+  // The pages of the program explain warnings by their keys.
+  if (count <= kPassedOn) pass(LogLevel::kWarning, message + " [" + key + "]");
   if (count == kPassedOn) pass(LogLevel::kWarning, "(further warnings of this kind are counted)");
 }
 

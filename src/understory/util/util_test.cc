@@ -102,7 +102,7 @@ TEST(Log, CountsEveryWarningButPassesOnOnlyTheFirstThree) {
     log.warn("imu.gap", "gap " + std::to_string(i));
   log.warn("a", "other");
   ASSERT_EQ(passed.size(), 5U);
-  EXPECT_EQ(passed[0], "gap 0");
+  EXPECT_EQ(passed[0], "gap 0 [imu.gap]");
   const auto warnings = log.warnings();
   ASSERT_EQ(warnings.size(), 2U);
   EXPECT_EQ(warnings[1].key, "imu.gap");

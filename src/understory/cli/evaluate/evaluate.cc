@@ -9,6 +9,7 @@
 #include "understory/cli/command.h"
 #include "understory/cli/evaluate/evaluate_map.h"
 #include "understory/cli/evaluate/evaluate_trees.h"
+#include "understory/cli/suggestion.h"
 #include "understory/evaluation/prism_errors.h"
 #include "understory/evaluation/trajectory_errors.h"
 #include "understory/util/error.h"
@@ -228,6 +229,8 @@ int evaluate(const EvaluateOptions& options, CommandContext& context) {
   if (options.estimate.empty() || options.truth.empty()) {
     throw ConfigError({"understory evaluate needs ESTIMATE and TRUTH (files or folders)"});
   }
+  for (const std::string& path : {options.estimate, options.truth})
+    refuse_unmapped(path);
   if (!options.prism_m.empty()) return evaluate_places(options, context);
   EvaluationOptions settings;
   settings.alignment = alignment_from_name(options.alignment);
@@ -282,7 +285,7 @@ void add_evaluate_command(CLI::App& app, Command& chosen) {
       ->expected(3);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->footer(
-      "Example:\n  understory evaluate run walk.truth --align se3\n"
+      "Examples:\n  understory evaluate run walk.truth --align se3\n"
       "  understory evaluate run walk.truth --align yaw --prism-m -0.3 0.4 2.6\n"
       "  understory evaluate trees run walk.truth --align yaw");
   command->callback([&chosen, options, command] {

@@ -57,7 +57,7 @@ void lay_by_globe(Epoch& before, const Epoch& after, bool moves_path) {
                      "is in " + before.layers.code() + ", and " + after.name + " in " +
                          after.layers.code() +
                          "; expected one coordinate system: lay one of them into that of the other "
-                         "by `georeference --crs`");
+                         "by `understory georeference RUN --method auto --crs EPSG:CODE -o RUN2`");
   const auto into_new = [&](const Eigen::Vector3d& point) {
     return after.layers.to_world(before.layers.from_world(point));
   };

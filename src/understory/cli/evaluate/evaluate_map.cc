@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "understory/cli/evaluate/evaluate_crispness.h"
+#include "understory/cli/suggestion.h"
 #include "understory/evaluation/map_entropy.h"
 #include "understory/evaluation/strip_roads.h"
 #include "understory/evaluation/trajectory.h"
@@ -187,6 +188,7 @@ void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
       "  understory evaluate map stems.csv.gz forest");
   command->callback([&chosen, options] {
     chosen = [options](CommandContext& context) {
+      refuse_unmapped(options->stems);
       context.stop_at_once();
       return options->trajectory.empty()
                  ? evaluate_crispness(options->stems, options->entropy, options->json, context)

@@ -10,6 +10,7 @@
 
 #include "understory/cli/evaluate/evaluate_epochs.h"
 #include "understory/cli/evaluate/evaluate_trees_text.h"
+#include "understory/cli/suggestion.h"
 #include "understory/evaluation/trees/tree_errors.h"
 #include "understory/evaluation/trees/tree_list_check.h"
 #include "understory/evaluation/trees/tree_rates.h"
@@ -61,6 +62,8 @@ void warn_of_list(const std::string& name, const std::vector<Tree>& trees, Log& 
 }
 
 int evaluate_trees(const TreeOptions& options, CommandContext& context) {
+  for (const std::string& list : {options.a, options.b})
+    refuse_unmapped(list);
   if (options.epochs) return evaluate_epochs(options, context);
   if (!options.output.empty()) throw ConfigError({"-o needs --epochs"});
   std::vector<Tree> a = read_trees(file_in_folder(options.a, "trees.csv"));

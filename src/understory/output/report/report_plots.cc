@@ -81,7 +81,7 @@ std::string filled_in(const StandTable& stand) {
   std::string html;
   if (seen.heights_filled_in > 0 && stand.curve)
     html += fmt::format(
-        " {} of {} heights were not seen. The height curve of the other {} trees stands for them "
+        " {} of {} heights were not seen. A height curve of {} trees of the list stands for them "
         "(single trees are ± {:.1f} m about it).",
         seen.heights_filled_in, seen.trees, stand.curve->trees, stand.curve->sd_m);
   if (seen.heights_lower_bounds > 0)

@@ -175,11 +175,18 @@ RunFolder RunFolder::reclaim(const fs::path& folder) {
   const fs::path path = without_slash(folder);
   refuse_foreign_work(path);
   refuse_running(path);
-  if (!holds_unfinished_run(path))
-    throw InputError(folder.string(), "",
-                     former_results(path).present
-                         ? "the run in it is finished: there is nothing to go on with"
-                         : "there is no unfinished run to go on with");
+  if (!holds_unfinished_run(path)) {
+    std::error_code ignored;
+    const std::string none = "there is no unfinished run to go on with";
+    throw InputError(
+        folder.string(), "",
+        former_results(path).present
+            ? "the run in it is finished: there is nothing to go on with. Its results are there, "
+              "begin with report.html"
+        : fs::exists(path, ignored)
+            ? none + "; `understory map RECORDING -o " + folder.string() + "` begins one"
+            : none + ": no such folder");
+  }
   return claim(path, true);
 }
 

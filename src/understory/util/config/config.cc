@@ -240,6 +240,13 @@ ConfigTable::Field* ConfigTable::find(const std::string& key) {
 }
 
 std::string ConfigTable::unknown(const std::string& key) const {
+  // `map` and `inventory` have settings in common, which `map` keeps in a section of its own.
+  const auto same_ending = [&key](const Field& field) {
+    return field.key.ends_with("." + key) || key.ends_with("." + field.key);
+  };
+  if (std::count_if(fields_.begin(), fields_.end(), same_ending) == 1)
+    return "unknown key (did you mean " +
+           std::find_if(fields_.begin(), fields_.end(), same_ending)->key + "?)";
   const Field* nearest = nullptr;
   std::size_t best = key.size() / 2 + 1;
   for (const Field& field : fields_) {
@@ -249,7 +256,9 @@ std::string ConfigTable::unknown(const std::string& key) const {
       nearest = &field;
     }
   }
-  return "unknown key" + (nearest != nullptr ? " (did you mean " + nearest->key + "?)" : "");
+  return nearest != nullptr
+             ? "unknown key (did you mean " + nearest->key + "?)"
+             : "unknown key (--print-config lists all, and --print-site those of a site)";
 }
 
 void ConfigTable::read_yaml(const std::string& text, const std::string& origin,

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "understory/util/error.h"
 
 namespace understory {
@@ -61,6 +63,22 @@ TEST(Config, ReportsAllProblemsAtOnceWithTheirLines) {
     EXPECT_EQ(error.problems()[1], "x.yaml:3: map.count: is \"1.5\", expected a whole number");
     EXPECT_NE(error.problems()[2].find("x.yaml:4: enabled"), std::string::npos);
     EXPECT_NE(error.problems()[3].find("expected fast|exact"), std::string::npos);
+  }
+}
+
+// `inventory` calls it count, and `map` keeps it in a section.
+TEST(Config, ProposesTheKeyOfAnotherSection) {
+  Sample sample;
+  ConfigTable table = table_of(sample);
+  const std::map<std::string, std::string> meant_by = {{"voxel_size_m", "map.voxel_size_m"},
+                                                       {"inventory.stand.map.count", "map.count"}};
+  for (const auto& [given, meant] : meant_by) {
+    try {
+      table.set({given + "=1"});
+      FAIL() << given;
+    } catch (const ConfigError& error) {
+      EXPECT_EQ(error.what(), "--set " + given + ": unknown key (did you mean " + meant + "?)");
+    }
   }
 }
 
