@@ -7,6 +7,7 @@
 #include <exception>
 #include <new>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "understory/cli/command.h"
@@ -146,11 +147,13 @@ std::string with_help(const CLI::App& app, const std::string& said) {
          help_of(chosen);
 }
 
-// "help map" is "map --help".
+// "help map" is "map --help", also behind --quiet and --verbose.
 std::vector<const char*> with_help_as_option(int argc, char** argv) {
   std::vector<const char*> words(argv, argv + argc);
-  if (words.size() < 2 || std::string(words[1]) != "help") return words;
-  words.erase(words.begin() + 1);
+  const auto command = std::find_if(words.begin() + std::min(argc, 1), words.end(),
+                                    [](std::string_view word) { return !word.starts_with('-'); });
+  if (command == words.end() || std::string_view(*command) != "help") return words;
+  words.erase(command);
   words.push_back("--help");
   return words;
 }
