@@ -160,6 +160,20 @@ inline constexpr double kAbovePerMetre = 0.05;
 inline constexpr int kMostRounds = 60;
 }  // namespace seen_ground
 
+namespace unseen_ground {  // forest/ground/unseen_ground.cc
+// m to both sides of a cell: how far it lies off their mean is the roughness of the ground [chosen]
+inline constexpr double kLag = 2.0;
+// Such differences that tell the roughness [chosen]
+inline constexpr std::size_t kLeastBends = 50;
+// Median of the absolute value of a standard normal variable [bound: definition]
+inline constexpr double kMedianOfNormal = 0.6745;
+// Standard deviation 2 m from the nearest seen ground, over the roughness [tuned on random seeds 1,
+// 3, 4, 9, 13, 16: docs/method/forest.md, Unseen ground]
+inline constexpr double kSdPerRoughness = 3.0;
+// m: terrain is not filled in farther [bound: above the default of ground.max_gap_m]
+inline constexpr double kFarthest = 12.0;
+}  // namespace unseen_ground
+
 namespace low_noise {  // forest/ground/low_noise.cc
 // m: edge of a cell whose layers are counted [chosen]
 inline constexpr double kCell = 2.0;
@@ -207,7 +221,7 @@ namespace top_judgement {  // forest/top_judgement.cc
 // Points in the half metre below the top of a tree whose top was seen, at least [bound: what a top
 // is called seen by]
 inline constexpr int kTopPoints = 5;
-// m: standard deviation of a height whose top was seen [chosen]
+// m: standard deviation of a height whose top and foot were seen [chosen]
 inline constexpr double kHeightSd = 0.6;
 // m: the same where the height is a lower bound [chosen]
 inline constexpr double kBoundSd = 2.0;

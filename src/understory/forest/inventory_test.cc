@@ -281,6 +281,25 @@ TEST(Inventory, ATreeThatMayGoOnAboveTheViewHasNoHeight) {
       << result.remarks.back();
 }
 
+// What fills the gap in the terrain under the first tree may be off, and so is its height.
+TEST(Inventory, AHeightIsLessSureWhereTheGroundAtItsFootWasNotSeen) {
+  TestPlot plot(33);
+  plot.bump_m = 0.8;
+  plot.add_ground(20.0, 40);
+  plot.add_stem({5.0, 5.0, 0.3});
+  plot.add_stem({14.0, 14.0, 0.3});
+  std::erase_if(plot.cloud, [&](const Eigen::Vector3d& point) {
+    return (point.head<2>() - Eigen::Vector2d(5.0, 5.0)).norm() < 3.0 &&
+           point.z() < plot.ground(point.x(), point.y()) + 0.8;
+  });
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  const Tree* hidden = nearest(result.trees, 5.0, 5.0);
+  const Tree* open = nearest(result.trees, 14.0, 14.0);
+  ASSERT_NE(hidden, nullptr);
+  ASSERT_NE(open, nullptr);
+  EXPECT_GT(hidden->height_sd_m, 1.02 * open->height_sd_m);
+}
+
 // A second crown stands between the scanner and the top of the first tree.
 TEST(Inventory, ATopBehindACrownIsALowerBound) {
   TestPlot plot(29);

@@ -105,7 +105,8 @@ void judge_tops(const StemTops& tops, const Lookouts& lookouts,
     if (std::isnan(tree.height_m)) continue;
     const bool seen = tops.top_points[i] >= kTopPoints && hidden[i] == 0 && cut[i] == 0;
     tree.height_is_lower_bound = seen ? 0.0 : 1.0;
-    tree.height_sd_m = seen ? kHeightSd : kBoundSd;
+    tree.height_sd_m =
+        std::hypot(seen ? kHeightSd : kBoundSd, result.ground.unseen.sd_m(tree.x, tree.y));
   }
 }
 

@@ -25,6 +25,7 @@ using Lookouts = std::function<std::vector<Eigen::Vector3d>(const Eigen::Vector3
 //   well both are seen;
 // - where tops end with the view (trees/view_limit.h), by their distance from `scanner`, or
 //   without that by the number of returns over the diameter.
+// Where the ground at the foot was not seen, a height is less sure (GroundModel::unseen).
 void judge_tops(const StemTops& tops, const Lookouts& lookouts,
                 const std::vector<Eigen::Vector3d>& scanner, InventoryResult& result);
 

@@ -310,6 +310,7 @@ GroundModel estimate_ground(const PointBlocks& unasked, const GroundConfig& conf
   const std::vector<char> reached = cells_around_known(terrain, gap);
   std::vector<float> dropped = terrain.values;
   drop_unseen_ground(terrain);
+  model.unseen = UnseenGround(terrain);
   for (std::size_t i = 0; i < dropped.size(); ++i) {
     if (std::isfinite(terrain.values[i])) dropped[i] = kNan;
   }

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "understory/forest/ground/unseen_ground.h"
 #include "understory/forest/point_blocks.h"
 #include "understory/geometry/raster.h"
 #include "understory/util/config/config.h"
@@ -29,6 +30,7 @@ void describe(ConfigTable& table, GroundConfig& config);
 struct GroundModel {
   Raster terrain;  // z of the ground
   GroundConfig config;
+  UnseenGround unseen;          // how sure the terrain is
   double measured_share = 0.0;  // of the cells with a height: those that held ground points
 
   // Metres above the ground; NaN where the terrain is unknown.
