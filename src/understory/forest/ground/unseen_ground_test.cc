@@ -47,7 +47,7 @@ TEST(UnseenGround, TakesTheNearestSeenCellInAnyDirection) {
   Raster raster = waves_with_a_gap(0.3);
   raster.values[raster.index(48, 24)] = 9.0F;  // one seen cell within the gap
   const UnseenGround ground(raster);
-  const double side = ground.sd_m(124.25, 13.25) / 2.0;          // two cells north of it
+  const double side = ground.sd_m(124.25, 13.25) / 2.0;  // two cells north of it
   EXPECT_NEAR(ground.sd_m(125.25, 13.25) / side, std::hypot(2.0, 2.0), 1e-9);
 }
 

@@ -1,5 +1,6 @@
 #include "understory/registration/loam/ring_clusters.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
