@@ -150,6 +150,8 @@ def run_cases(server):
             assert done.returncode == 0 and f"{count} trees" in done.stdout, done
             assert ("replaces" in done.stdout) == (round_ == 1), done
         assert server.sql("forest", "select count(*), count(distinct id) from understory.trees") == f"{count}|{count}"
+        # A GeoPackage of the user's beside the run stays out.
+        shutil.copy(run / "trees.gpkg", other / "plots.gpkg")
         assert convert(other).returncode == 0
         assert server.sql("forest", "select count(*) from understory.trees") == str(count + trees_in(other / "trees.gpkg"))
         assert server.sql("forest", "select count(*) from understory.runs") == "2"

@@ -45,7 +45,8 @@ def plain(*words):
 @cases.case("help as a command, and a command that was left out")
 def asked(folder):
     for words, page in ((("help",), ("--help",)), (("help", "map"), ("map", "--help")),
-                        (("help", "calibrate", "imu"), ("calibrate", "imu", "--help"))):
+                        (("help", "calibrate", "imu"), ("calibrate", "imu", "--help")),
+                        (("--quiet", "--threads", "2", "help", "map"), ("map", "--help"))):
         done = plain(*words)
         assert done.returncode == 0 and done.stdout and done.stdout == plain(*page).stdout, done
     assert "did you mean 'map'" in plain("help", "mpa").stderr

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -96,23 +97,33 @@ std::string help_of(const Chosen& chosen) {
   return " (understory " + chosen.name + (chosen.name.empty() ? "--help)" : " --help)");
 }
 
+// Where the command stands: the first word that is neither an option of the program nor its value.
+std::size_t place_of_command(const std::vector<const char*>& words) {
+  std::size_t k = 1;
+  for (; k < words.size(); ++k) {
+    const std::string_view word = words[k];
+    if (word == "--threads")
+      ++k;  // and its value
+    else if (!word.empty() && word.front() != '-')
+      return k;
+  }
+  return k;
+}
+
 // The parser only says that a command is missing. Empty if one is named or none is tried.
 std::string unknown_command(const CLI::App& app, const std::vector<const char*>& words) {
-  for (std::size_t k = 1; k < words.size(); ++k) {
-    const std::string word = words[k];
-    if (word == "--threads") ++k;  // and its value
-    if (word.empty() || word.front() == '-') continue;
-    std::vector<std::string> names;
-    for (const CLI::App* command : app.get_subcommands({}))
-      names.push_back(command->get_name());
-    if (std::find(names.begin(), names.end(), word) != names.end()) return {};
-    const std::string meant = nearest_word(word, names);
-    return "there is no command '" + word + "'" +
-           (meant.empty() ? "; the commands are: " + names_of_commands(app)
-                          : "; did you mean '" + meant + "'?") +
-           " (understory --help)";
-  }
-  return {};
+  const std::size_t place = place_of_command(words);
+  if (place >= words.size()) return {};
+  const std::string word = words[place];
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({}))
+    names.push_back(command->get_name());
+  if (std::find(names.begin(), names.end(), word) != names.end()) return {};
+  const std::string meant = nearest_word(word, names);
+  return "there is no command '" + word + "'" +
+         (meant.empty() ? "; the commands are: " + names_of_commands(app)
+                        : "; did you mean '" + meant + "'?") +
+         " (understory --help)";
 }
 
 // The first option that the command does not have, and the nearest one that it has; empty if each
@@ -147,13 +158,12 @@ std::string with_help(const CLI::App& app, const std::string& said) {
          help_of(chosen);
 }
 
-// "help map" is "map --help", also behind --quiet and --verbose.
+// "help map" is "map --help", also behind the program's own options.
 std::vector<const char*> with_help_as_option(int argc, char** argv) {
   std::vector<const char*> words(argv, argv + argc);
-  const auto command = std::find_if(words.begin() + std::min(argc, 1), words.end(),
-                                    [](std::string_view word) { return !word.starts_with('-'); });
-  if (command == words.end() || std::string_view(*command) != "help") return words;
-  words.erase(command);
+  const std::size_t place = place_of_command(words);
+  if (place >= words.size() || std::string_view(words[place]) != "help") return words;
+  words.erase(words.begin() + static_cast<std::ptrdiff_t>(place));
   words.push_back("--help");
   return words;
 }

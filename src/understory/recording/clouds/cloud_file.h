@@ -55,9 +55,9 @@ using PlaceChange = std::function<Eigen::Vector3d(const Eigen::Vector3d&)>;
 
 // Reads .las, .laz, .e57, .pcd, .ply or KITTI .bin (told by content, .bin by name). Points that
 // are no places (is_place) are left out. A file that breaks off gives the points up to there and a
-// warning
-// ("recording.damaged"); throws InputError if no point can be had from it. Of LAS, LAZ and E57
-// each point polls `progress`. With `change`, points and origin are in the frame that it leads to.
+// warning ("recording.damaged"); throws InputError if no point can be had from it. Of LAS, LAZ and
+// E57 each point polls `progress`. With `change`, points and origin are in the frame that it leads
+// to.
 [[nodiscard]] PointCloudFile read_cloud(const std::string& path, Log& log,
                                         const ProgressSink& progress = {},
                                         const PlaceChange& change = {});

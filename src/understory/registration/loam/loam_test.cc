@@ -306,8 +306,8 @@ TEST(Loam, EdgesCountAcrossTheirLineAndPlanesAlongTheirNormal) {
   EXPECT_NEAR(sums.cost, 0.5 * (across + 0.13 * 0.13) / (0.03 * 0.03), 2.0);
 }
 
-// Walls and a ceiling, and no ground: the two steps alone could move nothing.
-TEST(LoamGround, AllFeaturesCountAtTheEnd) {
+// A corner of a room with smooth points on its three sides.
+FeaturePoints corner_of_a_room(PointFeature feature) {
   FeaturePoints room;
   for (int i = 0; i <= 40; ++i) {
     for (int k = 0; k <= 40; ++k) {
@@ -318,7 +318,27 @@ TEST(LoamGround, AllFeaturesCountAtTheEnd) {
       room.points.emplace_back(2.0F, a, b);
     }
   }
-  room.features.assign(room.points.size(), PointFeature::kPlane);
+  room.features.assign(room.points.size(), feature);
+  return room;
+}
+
+// Ground is not laid on other planes, as LOAM would lay it.
+TEST(LoamGround, GroundMeetsGroundAlone) {
+  const auto overlap = [](const std::string& method, PointFeature feature) {
+    const auto builder = make_matcher(MatcherConfig(), method)->make_builder({});
+    builder->insert_features(corner_of_a_room(PointFeature::kPlane), Pose(), std::nullopt);
+    return builder->snapshot()
+        ->match_features(corner_of_a_room(feature), Pose(), {}, MatchStart::kNear)
+        .inlier_ratio;
+  };
+  EXPECT_EQ(overlap("loam_ground", PointFeature::kGround), 0.0);
+  EXPECT_GT(overlap("loam_ground", PointFeature::kPlane), 0.9);
+  EXPECT_GT(overlap("loam", PointFeature::kGround), 0.9);
+}
+
+// Walls and a ceiling, and no ground: the two steps alone could move nothing.
+TEST(LoamGround, AllFeaturesCountAtTheEnd) {
+  const FeaturePoints room = corner_of_a_room(PointFeature::kPlane);
   const auto matcher = make_matcher(MatcherConfig(), "loam_ground");
   const auto builder = matcher->make_builder({});
   builder->insert_features(room, Pose(), std::nullopt);
