@@ -73,6 +73,7 @@ class ClusterSearch {
         if (visit(cell, ring, column + (back ? columns - step : step))) break;
     }
     for (const std::size_t beside : {image_.ring_above(ring), image_.ring_below(ring)}) {
+      if (beside == ring) continue;
       for (std::size_t step = 0; step <= kColumnGap; ++step)
         if (visit(cell, beside, column + step) || visit(cell, beside, column + columns - step))
           break;

@@ -94,6 +94,14 @@ TEST(RingClusters, GoOnBehindTheLidarAndOverAnEmptyRing) {
   EXPECT_EQ(count(picture.clustered({.min_points = 16, .angle_deg = 30.0}), 0, 16), 16U);
 }
 
+// Of a lidar with fewer columns than the image many stay empty.
+TEST(RingClusters, AWallOfFewColumnsHangsTogether) {
+  RingPicture picture;
+  for (int column = -12; column < 12; column += 3)
+    picture.add(10.0, column, 6);
+  EXPECT_EQ(count(picture.clustered({.min_points = 8}), 0, 8), 8U);
+}
+
 TEST(RingClusters, PointsThatAreLeftOutJoinNothing) {
   RingPicture picture;
   picture.add_face(8.0, 0, 8, 6, 6);
