@@ -133,6 +133,7 @@ def check_stand(page, folder):
         assert abs(float(row[1]) - float(tree["x"])) < 0.0051, (row, tree)
         assert abs(float(row[4]) - 100 * float(tree["dbh_m"])) < 0.051, (row, tree)
         assert (row[7] == "") == (tree["height_m"] == ""), (row, tree)
+        assert not tree["height_sd_m"] or abs(float(row[8]) - float(tree["height_sd_m"])) < 0.056, (row, tree)
     facts = json.loads((folder / "run.json").read_text())["quality"]
     assert abs(number(page.tiles["area seen (not a plot's border)"]) - facts["seen_area_m2"] / 1e4) < 0.0051
     assert abs(number(page.tiles["stems per hectare"]) - facts["stems_per_ha"]) < 0.51

@@ -332,6 +332,8 @@ std::vector<TableColumn> columns_of(const std::vector<Tree>& trees,
   }
   if (of_cloud)
     columns.push_back({"height, m", [&trees](std::size_t i) { return height_text(trees[i]); }});
+  if (of_cloud && any(&Tree::height_sd_m))
+    columns.push_back({"± m", number(&Tree::height_sd_m, 1)});
   if (measured) columns.push_back({of_cloud ? "returns" : "views", observations});
   if (measured && stems != nullptr)
     columns.push_back({"seen around, °", [stems](std::size_t i) {
@@ -354,7 +356,11 @@ std::string about_columns(const std::vector<StemFit>* stems, bool of_cloud, bool
   const bool with_stems = stems == nullptr || !stems->empty();
   if (with_stems) html += "They are those of the stem's foot. ";
   if (!of_cloud) html += "Views are the scans that show the stem.";
-  if (of_cloud && with_stems) html += "Returns are laser points on the stem. ";
+  if (of_cloud && with_stems)
+    html +=
+        "The error of a height (± m) is large where the ground at the foot was not seen. Returns "
+        "are "
+        "laser points on the stem. ";
   if (stems != nullptr && with_stems)
     html += "Seen around is the part of its circumference that the laser saw.";
   return html + "</p>";

@@ -117,7 +117,8 @@ StreamedCloud begin_cloud(PointCloudFile about, const Stated& stated, const Clou
 }
 
 StreamedCloud end_cloud(StreamedCloud cloud, const std::string& path, int threads) {
-  if (cloud.tiles->points() == 0) throw InputError(path, "", "holds no finite point");
+  if (cloud.tiles->points() == 0)
+    throw InputError(path, "", "holds no point with usable coordinates");
   cloud.tiles->finish(threads);
   return cloud;
 }

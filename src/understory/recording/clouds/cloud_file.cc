@@ -154,7 +154,8 @@ PointCloudFile read_cloud(ByteSource& file, Log& log, const ProgressSink& progre
       throw InputError(file.name(), "byte 0",
                        "expected a cloud (.las, .laz, .e57, .pcd, .ply, .bin)");
   }
-  if (cloud.points.empty()) throw InputError(file.name(), "", "holds no finite point");
+  if (cloud.points.empty())
+    throw InputError(file.name(), "", "holds no point with usable coordinates");
   return cloud;
 }
 
