@@ -7,7 +7,7 @@
 #include <string>
 
 #include "understory/output/database/postgis.h"
-#include "understory/output/geojson.h"
+#include "understory/output/layers/geojson.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/run_folder/run_json.h"
 #include "understory/util/error.h"

@@ -1,7 +1,7 @@
 #include "understory/output/inventory_files.h"
 
-#include "understory/output/geo_files.h"
-#include "understory/output/layer_files.h"
+#include "understory/output/layers/geo_files.h"
+#include "understory/output/layers/layer_files.h"
 #include "understory/output/run_tables.h"
 
 namespace understory {

@@ -1,7 +1,7 @@
 #include "understory/output/obstacle_files.h"
 
-#include "understory/output/geo_files.h"
-#include "understory/output/layer_files.h"
+#include "understory/output/layers/geo_files.h"
+#include "understory/output/layers/layer_files.h"
 
 namespace understory {
 namespace {

@@ -18,7 +18,7 @@
 #include <laszip/laszip_api.h>
 
 #include "understory/output/clouds/las_writer.h"
-#include "understory/output/geo_files.h"
+#include "understory/output/layers/geo_files.h"
 #include "understory/output/run_summary.h"
 #include "understory/output/run_tables.h"
 #include "understory/util/error.h"

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "understory/geometry/quiet_gdal.h"
-#include "understory/output/geo_files.h"
+#include "understory/output/layers/geo_files.h"
 #include "understory/util/files/csv.h"
 #include "understory/util/files/folder_test_support.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "understory/output/layer_files.h"
+#include "understory/output/layers/layer_files.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/correction_report.h"
 #include "understory/pipeline/correction/correction_summary.h"

@@ -4,8 +4,8 @@
 #include <system_error>
 
 #include "understory/evaluation/trees/tree_errors.h"
-#include "understory/output/layer_files.h"
-#include "understory/output/moved_vectors.h"
+#include "understory/output/layers/layer_files.h"
+#include "understory/output/layers/moved_vectors.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/head_cut_log.h"
 #include "understory/pipeline/georeferencing/moved_layers.h"

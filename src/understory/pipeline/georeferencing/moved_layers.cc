@@ -6,7 +6,7 @@
 
 #include "understory/georeference/terrain_file.h"
 #include "understory/output/copc/copc_writer.h"
-#include "understory/output/layer_files.h"
+#include "understory/output/layers/layer_files.h"
 #include "understory/output/obstacle_files.h"
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/clouds/las.h"

@@ -9,7 +9,7 @@
 
 #include "understory/georeference/terrain_file.h"
 #include "understory/output/clouds/las_writer.h"
-#include "understory/output/geo_files.h"
+#include "understory/output/layers/geo_files.h"
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/clouds/las.h"
 #include "understory/util/files/folder_test_support.h"

@@ -4,7 +4,7 @@
 
 #include "understory/georeference/systems/layer_frame.h"
 #include "understory/map/map_tiles.h"
-#include "understory/output/layer_files.h"
+#include "understory/output/layers/layer_files.h"
 #include "understory/util/random.h"
 
 namespace understory {

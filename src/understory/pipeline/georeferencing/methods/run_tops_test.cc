@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "understory/output/geo_files.h"
+#include "understory/output/layers/geo_files.h"
 #include "understory/util/files/folder_test_support.h"
 
 namespace understory {

@@ -9,7 +9,7 @@
 #include "understory/forest/inventory.h"
 #include "understory/output/clouds/las_writer.h"
 #include "understory/output/inventory_files.h"
-#include "understory/output/layer_files.h"
+#include "understory/output/layers/layer_files.h"
 #include "understory/output/obstacle_files.h"
 #include "understory/output/plot_files.h"
 

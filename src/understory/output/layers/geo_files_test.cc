@@ -1,4 +1,4 @@
-#include "understory/output/geo_files.h"
+#include "understory/output/layers/geo_files.h"
 
 #include <gdal_priv.h>
 #include <gtest/gtest.h>

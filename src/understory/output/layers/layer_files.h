@@ -11,7 +11,7 @@
 #include "understory/georeference/systems/layer_frame.h"
 #include "understory/georeference/systems/moved_raster.h"
 #include "understory/output/clouds/las_writer.h"
-#include "understory/output/geo_files.h"
+#include "understory/output/layers/geo_files.h"
 #include "understory/sensor/tree.h"
 #include "understory/util/log.h"
 

@@ -1,11 +1,11 @@
-#include "understory/output/geojson.h"
+#include "understory/output/layers/geojson.h"
 
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "understory/output/geo_files.h"
+#include "understory/output/layers/geo_files.h"
 #include "understory/util/error.h"
 #include "understory/util/files/folder_test_support.h"
 

@@ -1,4 +1,4 @@
-#include "understory/output/geo_files.h"
+#include "understory/output/layers/geo_files.h"
 
 #include <cpl_conv.h>
 #include <cpl_error.h>

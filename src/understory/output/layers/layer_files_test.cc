@@ -1,4 +1,4 @@
-#include "understory/output/layer_files.h"
+#include "understory/output/layers/layer_files.h"
 
 #include <gtest/gtest.h>
 #include <ogrsf_frmts.h>
@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "understory/geometry/quiet_gdal.h"
-#include "understory/output/qgis_project.h"
+#include "understory/output/layers/qgis_project.h"
 #include "understory/util/files/folder_test_support.h"
 #include "understory/util/files/text_file.h"
 

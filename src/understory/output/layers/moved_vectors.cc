@@ -1,4 +1,4 @@
-#include "understory/output/moved_vectors.h"
+#include "understory/output/layers/moved_vectors.h"
 
 #include <cpl_conv.h>
 #include <cpl_error.h>

@@ -1,4 +1,4 @@
-#include "understory/output/moved_vectors.h"
+#include "understory/output/layers/moved_vectors.h"
 
 #include <gtest/gtest.h>
 #include <ogrsf_frmts.h>
@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "understory/geometry/quiet_gdal.h"
-#include "understory/output/layer_files.h"
+#include "understory/output/layers/layer_files.h"
 #include "understory/util/files/folder_test_support.h"
 
 namespace understory {

@@ -1,4 +1,4 @@
-#include "understory/output/qgis_project.h"
+#include "understory/output/layers/qgis_project.h"
 
 #include <fmt/format.h>
 #include <gdal_priv.h>

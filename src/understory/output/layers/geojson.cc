@@ -1,4 +1,4 @@
-#include "understory/output/geojson.h"
+#include "understory/output/layers/geojson.h"
 
 #include <cpl_error.h>
 #include <ogrsf_frmts.h>

@@ -1,4 +1,4 @@
-#include "understory/output/layer_files.h"
+#include "understory/output/layers/layer_files.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/output/copc/copc_writer.h"
-#include "understory/output/qgis_project.h"
+#include "understory/output/layers/qgis_project.h"
 
 namespace understory {
 namespace {
