@@ -245,6 +245,9 @@ def run_cases(server):
             assert abs(x - wanted[0]) < 1e-7 and abs(y - wanted[1]) < 1e-7, (feature, wanted)
         assert program("convert", run, out).returncode == 3, "a file that is there was replaced"
         assert program("convert", run / "trees.gpkg", out, "--overwrite").returncode == 0
+        crowns = folder / "crowns.geojson"
+        none = program("convert", run, crowns, "--layer", "stems")
+        assert none.returncode == 3 and "the file has trees" in none.stderr and not crowns.exists(), none
         return f"{count} trees where PostGIS has them"
 
     try:

@@ -65,6 +65,28 @@ def check_map(browser):
     assert colours > 20, colours
 
 
+def check_crowns(browser):
+    """A box draws the outlines of all crowns; that of the chosen tree is always there."""
+    count = "(c => { const all = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;" \
+            "for (let i = 0; i < all.length; i += 4) n += all[i] === %d && all[i + 1] === %d && all[i + 2] === %d;" \
+            "return n; })(document.querySelector('canvas'))"
+    green, blue = (count % colour for colour in ((0x14, 0x53, 0x2d), (0x0b, 0x5f, 0xb0)))
+    browser.run("selection.choose(0, 'test')")
+    browser.wait()
+    assert browser.run(green) == 0 and browser.run(blue) == 0
+    browser.run("selection.choose(4, 'test')")
+    browser.wait()
+    with_crown = browser.run(blue)
+    browser.run("(m => { m.map.kept = m.map.crowns; m.map.crowns = []; m.repaint(); })(selection.map)")
+    browser.wait()
+    assert browser.run(green) == 0 and with_crown > browser.run(blue) + 50, (with_crown, browser.run(blue))
+    browser.run("selection.map.map.crowns = selection.map.map.kept")
+    browser.run("[...document.querySelectorAll('.layers label')].find((l) => l.textContent.includes('crowns'))"
+                ".querySelector('input').click()")
+    browser.wait()
+    assert browser.run(green) > 200, browser.run(green)
+
+
 def check_table(browser):
     """Sorting by a column, empty cells last; a filter hides rows and pales the trees of the map."""
     heads = browser.run("[...document.querySelector('.all-trees table').tHead.rows[0].cells].map((c) => c.textContent)")
@@ -147,6 +169,14 @@ with tempfile.TemporaryDirectory() as scratch:
         check_table(browser)
         check_sheets(browser)
         check_print(browser, scratch / "report.pdf")
+        assert browser.errors() == [], browser.errors()
+    done = subprocess.run([PROGRAM, "--quiet", "inventory", scratch / "run", "-o", scratch / "full"], capture_output=True,
+                          text=True)
+    assert done.returncode in (0, 4), done.stderr
+    with chromium.Browser() as browser:
+        browser.open(scratch / "full" / "report.html")
+        browser.wait()
+        check_crowns(browser)
         assert browser.errors() == [], browser.errors()
     check_without_scripts(page)
     check_narrow(page)

@@ -217,6 +217,8 @@ int run_convert(const ConvertOptions& options, CommandContext& context) {
 void add_layer_options(CLI::App& command, LayerConversion& layers) {
   command.add_option("--to", layers.target,
                      "Trees and path of a run into a PostGIS database: PG:host=... dbname=...");
+  command.add_option("--layer", layers.layer, "Layer of trees.gpkg that a .geojson holds")
+      ->capture_default_str();
   command.add_option("--schema", layers.schema, "Schema of the database")->capture_default_str();
   command.add_option("--run-id", layers.run_id,
                      "Rows of the same run are replaced (default: by the hashes of its input)");
@@ -236,8 +238,8 @@ void add_convert_command(CLI::App& app, Command& chosen) {
       ->required();
   command->add_option(
       "OUT", options->output,
-      "x.mcap: a recording; x.csv.gz: the stems seen in it, or in a cloud; x.geojson: "
-      "the trees of a run; else a folder of clouds");
+      "x.mcap: a recording; x.csv.gz: the stems seen in it, or in a cloud. x.geojson: "
+      "the trees of a run, or another layer (--layer). Else a folder of clouds");
   command->add_flag("--overwrite", options->overwrite, "Replace a file OUT that is there already");
   command->add_option("--format", options->format, "Clouds of a folder (default pcd)")
       ->check(CLI::IsMember({"pcd", "ply", "las", "laz", "bin"}));
@@ -251,6 +253,7 @@ void add_convert_command(CLI::App& app, Command& chosen) {
       "  understory convert walk.mcap walk_clouds --format ply\n"
       "  understory convert plot.laz plot.stems.csv.gz\n"
       "  understory convert RUN trees.geojson\n"
+      "  understory convert RUN crowns.geojson --layer crowns\n"
       "  understory convert RUN --to 'PG:host=localhost dbname=forest'");
   command->callback([options, &chosen] {
     chosen = [options](CommandContext& context) { return run_convert(*options, context); };

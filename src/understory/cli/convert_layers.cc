@@ -74,8 +74,8 @@ int convert_layers(const LayerConversion& conversion, CommandContext& context) {
   const fs::path package = file_in_folder(conversion.input, "trees.gpkg");
   refuse_input_as_output(conversion.output, {package});
   const fs::path output = place_of_file(conversion.output, conversion.overwrite);
-  const std::size_t trees = write_geojson(package, "trees", output);
-  fmt::print("{} trees in {}\n", trees, conversion.output);
+  const std::size_t rows = write_geojson(package, conversion.layer, output);
+  fmt::print("{} {} in {}\n", rows, conversion.layer, conversion.output);
   return kExitDone;
 }
 

@@ -6,11 +6,12 @@
 
 namespace understory {
 
-// What `convert RUN` writes of the layers of a run: its trees, its path.
+// What `convert RUN` writes of the layers of a run: one of them, or all into a database.
 struct LayerConversion {
-  std::string input;   // run folder or GeoPackage
-  std::string output;  // .geojson; empty where `target` is given
-  std::string target;  // "PG:..."
+  std::string input;            // run folder or GeoPackage
+  std::string output;           // .geojson; empty where `target` is given
+  std::string target;           // "PG:..."
+  std::string layer = "trees";  // of a .geojson
   std::string schema = "understory";
   std::string run_id;  // empty: from the hashes of the run's input
   bool overwrite = false;

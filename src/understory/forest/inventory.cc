@@ -118,6 +118,9 @@ void find_crowns(const CrownTask& task, TileShelf<std::uint64_t>& cubes, Invento
     result.trees[i].crown_base_m = crowns[i].base_m;
     result.trees[i].crown_area_m2 = crowns[i].area_m2;
     result.trees[i].crown_volume_m3 = crowns[i].volume_m3;
+    for (Eigen::Vector2d& corner : crowns[i].outline)
+      corner += result.origin.head<2>();
+    result.crown_outlines.push_back(std::move(crowns[i].outline));
   }
 }
 

@@ -21,6 +21,7 @@
 #include "understory/forest/trees/tree_owners.h"
 #include "understory/forest/trees/tree_segments.h"
 #include "understory/forest/trees/tree_sheets.h"
+#include "understory/geometry/plane/plot_shape.h"
 #include "understory/sensor/stem_view.h"
 #include "understory/sensor/tree.h"
 #include "understory/util/log.h"
@@ -63,7 +64,10 @@ struct InventoryResult {
   std::vector<StemFit> stems;        // of the same index as the first trees
   std::vector<StemCurve> curves;     // of the same index; of a full inventory only
   std::optional<TreeOwners> owners;  // of a full inventory: the trees' points
-  // Instead of them where the cloud lies in several tiles; not without the cloud.
+  // Of the same index as the stems, of a full inventory: each crown seen from above, world frame.
+  // Empty where no crown was seen.
+  std::vector<PlaneRing> crown_outlines;
+  // Instead of the owners where the cloud lies in several tiles; not without the cloud.
   std::shared_ptr<OwnerTiles> owner_tiles;
   std::optional<CanopyCrowns> crowns;  // where trees were found by them
   std::vector<int> crown_ids;  // id of the tree of each crown, 0 where it is none of the list

@@ -62,6 +62,10 @@ TEST(Inventory, AFullOneHasCurvesVolumesCrownsAndTheTreeOfEachPoint) {
     EXPECT_NEAR(tree.crown_base_m, 4.0, 1.1);
     EXPECT_GT(tree.crown_area_m2, 1.0);
     EXPECT_LT(tree.crown_area_m2, 8.0);
+    ASSERT_GT(result.crown_outlines.at(i).size(), 4U);
+    EXPECT_NEAR(signed_area_m2(result.crown_outlines[i]), tree.crown_area_m2, 1e-9);
+    for (const Eigen::Vector2d& corner : result.crown_outlines[i])
+      EXPECT_LT((corner - Eigen::Vector2d(tree.x, tree.y)).norm(), 3.0) << "in the world frame";
     const double ground = plot.ground(tree.x, tree.y);
     EXPECT_EQ(tree_at(result, {tree.x + 0.5 * tree.dbh_m, tree.y, ground + 2.0}, 2.0),
               static_cast<std::uint32_t>(tree.id));
@@ -133,6 +137,7 @@ TEST(Inventory, ABasicOneHasNoneOfThat) {
   EXPECT_FALSE(result.owners);
   EXPECT_TRUE(std::isnan(result.trees[0].stem_volume_m3));
   EXPECT_TRUE(std::isnan(result.trees[0].crown_area_m2));
+  EXPECT_TRUE(result.crown_outlines.empty());
   EXPECT_EQ(tree_at(result, {6.1, 6.0, 102.0}, 2.0), 0U);
 }
 

@@ -1,5 +1,6 @@
 #include "understory/output/inventory_files.h"
 
+#include "understory/output/layers/crown_outlines.h"
 #include "understory/output/layers/geo_files.h"
 #include "understory/output/layers/layer_files.h"
 #include "understory/output/run_tables.h"
@@ -16,8 +17,11 @@ void write_tree_tables(const std::filesystem::path& folder, const InventoryResul
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
                            const std::string& crs, const std::vector<StandPlot>& plots) {
   write_tree_tables(folder, inventory);
-  write_trees_gpkg(folder / "trees.gpkg", inventory.trees, crs, {}, "",
-                   looks_in(LayerFrame(), inventory.look_again), plots);
+  TreeLayers layers;
+  layers.look_again = looks_in(LayerFrame(), inventory.look_again);
+  layers.plots = plots;
+  layers.crowns = crown_outlines(inventory);
+  write_trees_gpkg(folder / "trees.gpkg", inventory.trees, crs, layers);
   if (!inventory.ground.terrain.empty()) {
     write_geotiff(folder / "dtm.tif", inventory.ground.terrain, crs);
   }
@@ -30,7 +34,7 @@ void write_inventory_files(const std::filesystem::path& folder, const InventoryR
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
                            const LayerFrame& layers, const std::vector<StandPlot>& plots) {
   write_tree_tables(folder, inventory);
-  write_tree_layers(folder, inventory.trees, {}, layers, inventory.look_again, plots);
+  write_tree_layers(folder, inventory, {}, layers, plots);
   write_raster_layers(folder, inventory.ground.terrain, inventory.canopy, change_into(layers),
                       layers);
 }

@@ -65,7 +65,9 @@ TEST(PlotFiles, ATableOfPlotsAndOneOfTheirClasses) {
 TEST(PlotFiles, TheirOutlinesAreALayerBesideTheTrees) {
   const test::TemporaryFolder folder;
   const std::string file = (folder / "trees.gpkg").string();
-  write_trees_gpkg(file, {Tree{}}, "EPSG:3067", {}, "", {}, table().plots);
+  TreeLayers layers;
+  layers.plots = table().plots;
+  write_trees_gpkg(file, {Tree{}}, "EPSG:3067", layers);
   const QuietGdal quiet;
   const GDALDatasetUniquePtr dataset(
       GDALDataset::Open(file.c_str(), GDAL_OF_VECTOR | GDAL_OF_READONLY));

@@ -135,6 +135,7 @@ void expect_same(const InventoryResult& a, const InventoryResult& b) {
     EXPECT_EQ(one.observations, other.observations);
     EXPECT_EQ(one.id, other.id);
   }
+  EXPECT_EQ(a.crown_outlines, b.crown_outlines);
 }
 
 // The tree of each point, in the order of the cloud.

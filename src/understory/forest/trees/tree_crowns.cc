@@ -90,8 +90,8 @@ Places half_outline(Iterator begin, Iterator end) {
   return corners;
 }
 
-// Area of the convex outline of the places, without the few that stick out of it.
-double convex_area(const Places& places, const Eigen::Vector2d& middle) {
+// The convex outline of the places, against the clock, without the few that stick out of it.
+PlaneRing convex_outline(const Places& places, const Eigen::Vector2d& middle) {
   const Reaches reaches = reaches_of(places, middle, kOutlineQuantile);
   Places within;
   for (const Eigen::Vector2d& place : places)
@@ -99,13 +99,11 @@ double convex_area(const Places& places, const Eigen::Vector2d& middle) {
   std::sort(within.begin(), within.end(), [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
   });
-  double twice = 0.0;
-  for (const Places& half :
-       {half_outline(within.begin(), within.end()), half_outline(within.rbegin(), within.rend())}) {
-    for (std::size_t i = 1; i < half.size(); ++i)
-      twice += half[i - 1].x() * half[i].y() - half[i - 1].y() * half[i].x();
-  }
-  return 0.5 * std::abs(twice);
+  // The second half begins where the first one ends, and ends where that begins.
+  PlaneRing outline = half_outline(within.begin(), within.end());
+  const Places back = half_outline(within.rbegin(), within.rend());
+  if (back.size() > 2) outline.insert(outline.end(), back.begin() + 1, back.end() - 1);
+  return outline;
 }
 
 // The layers of one tree: its cubes by height.
@@ -161,7 +159,8 @@ TreeCrown crown_of(const std::vector<TreeOwners::Voxel>& voxels, const OwnerTree
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& place : all)
     middle += place / static_cast<double>(all.size());
-  crown.area_m2 = convex_area(all, middle);
+  crown.outline = convex_outline(all, middle);
+  crown.area_m2 = std::abs(signed_area_m2(crown.outline));
   return crown;
 }
 

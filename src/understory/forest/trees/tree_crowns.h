@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "understory/forest/trees/tree_owners.h"
+#include "understory/geometry/plane/plot_shape.h"
 
 namespace understory {
 
@@ -14,6 +15,7 @@ struct TreeCrown {
   double base_m = kUnknown;     // above the ground: where the layers become wide and stay so
   double area_m2 = kUnknown;    // of its outline seen from above
   double volume_m3 = kUnknown;  // sum of the outlines of its layers
+  PlaneRing outline;            // seen from above: convex, against the clock, metres
 };
 
 // Base, area and volume of each crown. The area is that of the convex outline; the outlines of the

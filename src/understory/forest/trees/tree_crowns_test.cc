@@ -44,6 +44,29 @@ TEST(TreeCrowns, TheAreaIsThatOfTheConvexOutline) {
   EXPECT_NEAR(crown.volume_m3, 7.0 * M_PI * 4.0, 0.15 * 7.0 * M_PI * 4.0);
 }
 
+TEST(TreeCrowns, TheOutlineRunsAgainstTheClockRoundTheCrown) {
+  const TreeCrown crown = crown_with_bush(0.0);
+  EXPECT_NEAR(signed_area_m2(crown.outline), crown.area_m2, 1e-9);
+  ASSERT_GT(crown.outline.size(), 8U);
+  for (std::size_t i = 0; i < crown.outline.size(); ++i) {
+    const Eigen::Vector2d& corner = crown.outline[i];
+    EXPECT_NEAR(corner.norm(), 2.0, 0.15);
+    const Eigen::Vector2d& next = crown.outline[(i + 1) % crown.outline.size()];
+    const Eigen::Vector2d ahead = crown.outline[(i + 2) % crown.outline.size()] - next;
+    const Eigen::Vector2d along = next - corner;
+    EXPECT_GT(along.x() * ahead.y() - along.y() * ahead.x(), 0.0) << "convex, no corner twice";
+  }
+}
+
+TEST(TreeCrowns, WhereNoCrownWasSeenThereIsNoOutline) {
+  TreeOwners owners;
+  for (double height = 0.3; height < 3.0; height += 0.1)
+    add_disc(owners, 0.1, height);
+  const std::vector<OwnerTree> trees = {owner_tree(15.0)};
+  owners.find(trees, {});
+  EXPECT_TRUE(measure_crowns(owners, trees)[0].outline.empty());
+}
+
 TEST(TreeCrowns, ABushAtTheFootIsNotTheBase) {
   EXPECT_NEAR(crown_with_bush(0.0).base_m, 8.0, 0.51);
   EXPECT_NEAR(crown_with_bush(4.2).base_m, 8.0, 0.51);

@@ -12,6 +12,7 @@
 #include <limits>
 #include <memory>
 #include <system_error>
+#include <unordered_map>
 #include <utility>
 
 #include "understory/geometry/quiet_gdal.h"
@@ -219,10 +220,10 @@ OGRLinearRing closed(const PlaneRing& points) {
 }
 
 // Each hole belongs to the outer ring before it.
-OGRMultiPolygon polygons_of(const StandPlot& plot) {
+OGRMultiPolygon polygons_of(const std::vector<PlaneRing>& rings) {
   OGRMultiPolygon all;
   std::unique_ptr<OGRPolygon> part;
-  for (const PlaneRing& points : plot.drawn) {
+  for (const PlaneRing& points : rings) {
     if (signed_area_m2(points) > 0.0 && part != nullptr) all.addGeometryDirectly(part.release());
     if (part == nullptr) part = std::make_unique<OGRPolygon>();
     OGRLinearRing ring = closed(points);
@@ -242,9 +243,41 @@ void add_plots(OGRLayer& layer, const std::vector<StandPlot>& plots,
       const double value = column.value(plot);
       if (std::isfinite(value)) feature->SetField(column.name, value);
     }
-    const OGRMultiPolygon shape = polygons_of(plot);
+    const OGRMultiPolygon shape = polygons_of(plot.drawn);
     feature->SetGeometry(&shape);
     if (layer.CreateFeature(feature.get()) != OGRERR_NONE) fail(path);
+  }
+}
+
+// Columns of trees.csv that the layer `crowns` has, beside the number of the tree.
+bool tells_of_crown(const TreeColumn& column) {
+  const auto* member = std::get_if<double Tree::*>(&column.member);
+  return member != nullptr &&
+         (*member == &Tree::height_m || *member == &Tree::crown_base_m ||
+          *member == &Tree::crown_area_m2 || *member == &Tree::crown_volume_m3);
+}
+
+// The outlines of crowns: a layer with its rows.
+void add_crowns(GDALDataset& dataset, const std::vector<CrownOutline>& crowns,
+                const std::vector<Tree>& trees, const std::string& crs_wkt,
+                const std::filesystem::path& path) {
+  if (crowns.empty()) return;
+  OGRLayer* layer = add_layer(dataset, "crowns", wkbMultiPolygon, crs_wkt,
+                              "crowns of the trees, seen from above", path);
+  add_field(*layer, "tree_id", true, path);
+  for (const TreeColumn& column : kTreeColumns)
+    if (tells_of_crown(column)) add_field(*layer, column.name, false, path);
+  std::unordered_map<int, const Tree*> by_id;
+  for (const Tree& tree : trees)
+    by_id.emplace(tree.id, &tree);
+  for (const CrownOutline& crown : crowns) {
+    const std::unique_ptr<OGRFeature> feature(new OGRFeature(layer->GetLayerDefn()));
+    feature->SetField("tree_id", crown.tree);
+    for (const TreeColumn& column : kTreeColumns)
+      if (tells_of_crown(column)) set_field(*feature, column, *by_id.at(crown.tree));
+    const OGRMultiPolygon shape = polygons_of(crown.rings);
+    feature->SetGeometry(&shape);
+    if (layer->CreateFeature(feature.get()) != OGRERR_NONE) fail(path);
   }
 }
 
@@ -287,12 +320,10 @@ void add_row(OGRLayer& layer, const PointRow& row, const std::filesystem::path& 
 }  // namespace
 
 void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,
-                      const std::string& crs_wkt, const PathLine& line, const std::string& heights,
-                      const std::vector<LookPoint>& look_again,
-                      const std::vector<StandPlot>& plots) {
+                      const std::string& crs_wkt, const TreeLayers& layers) {
   const QuietGdal quiet;
   GDALDatasetUniquePtr dataset = new_package(path);
-  const std::string above = heights.empty() ? "" : "; heights are " + heights;
+  const std::string above = layers.heights.empty() ? "" : "; heights are " + layers.heights;
   OGRLayer* layer = add_layer(*dataset, "trees", wkbPoint25D, crs_wkt,
                               "trees where the stem meets the ground" + above, path);
   for (const TreeColumn& column : kTreeColumns) {
@@ -300,23 +331,24 @@ void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>
       add_field(*layer, column.name, std::holds_alternative<int Tree::*>(column.member), path);
   }
   OGRLayer* drawn = nullptr;
-  if (line.points.size() > 1) {
+  if (layers.path.points.size() > 1) {
     drawn =
         add_layer(*dataset, "path", wkbLineString25D, crs_wkt, "path of the scanner" + above, path);
     for (const char* name : {"begin_s", "end_s", "length_m"})
       add_field(*drawn, name, false, path);
   }
   OGRLayer* plotted = nullptr;
-  if (!plots.empty()) {
+  if (!layers.plots.empty()) {
     plotted = add_layer(*dataset, "plots", wkbMultiPolygon, crs_wkt,
                         "sample plots and grid cells with the figures of their trees", path);
     add_plot_fields(*plotted, path);
   }
   dataset->StartTransaction();
   add_trees(*layer, trees, path);
-  if (drawn != nullptr) add_line(*drawn, line, path);
-  if (plotted != nullptr) add_plots(*plotted, plots, path);
-  add_looks(*dataset, look_again, crs_wkt, path);
+  if (drawn != nullptr) add_line(*drawn, layers.path, path);
+  if (plotted != nullptr) add_plots(*plotted, layers.plots, path);
+  add_looks(*dataset, layers.look_again, crs_wkt, path);
+  add_crowns(*dataset, layers.crowns, trees, crs_wkt, path);
   if (dataset->CommitTransaction() != OGRERR_NONE) fail(path);
   close(std::move(dataset), path);
 }

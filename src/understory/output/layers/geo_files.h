@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "understory/forest/stand/stand_table.h"
+#include "understory/geometry/plane/plot_shape.h"
 #include "understory/geometry/raster.h"
 #include "understory/sensor/tree.h"
 
@@ -33,15 +34,25 @@ struct LookPoint {
   std::string reason;
 };
 
-// GeoPackage with the layer `trees` of points (x, y, z = ground) and the columns of trees.csv.
-// Where there is a path it has the layer `path`, and where there are places to look from again the
-// layer `look_again`. Where there are plots it has the layer `plots` (polygons, their rings
-// `drawn`). Without a system the layers have srs_id -1 (undefined Cartesian), which QGIS takes for
-// metres. `heights` says what z is above.
+// The crown of one tree, seen from above.
+struct CrownOutline {
+  int tree = 0;                  // its id
+  std::vector<PlaneRing> rings;  // frame of the layer; each hole after the ring around it
+};
+
+// What trees.gpkg holds beside the layer `trees`. A layer without rows is left out.
+struct TreeLayers {
+  PathLine path;                      // `path`
+  std::vector<LookPoint> look_again;  // `look_again`
+  std::vector<StandPlot> plots;       // `plots`: their rings `drawn`, as polygons
+  std::vector<CrownOutline> crowns;   // `crowns`: polygons, with what trees.csv says of each crown
+  std::string heights;                // what z is above
+};
+
+// GeoPackage with the layer `trees` of points (x, y, z = ground) and the columns of trees.csv, and
+// the other layers that are not empty. Without a system the layers have srs_id -1 (undefined
+// Cartesian), which QGIS takes for metres.
 void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>& trees,
-                      const std::string& crs_wkt, const PathLine& line = {},
-                      const std::string& heights = "",
-                      const std::vector<LookPoint>& look_again = {},
-                      const std::vector<StandPlot>& plots = {});
+                      const std::string& crs_wkt, const TreeLayers& layers = {});
 
 }  // namespace understory

@@ -40,6 +40,14 @@ std::unique_ptr<OGRCoordinateTransformation> way_to_globe(OGRLayer& layer,
   return way;
 }
 
+// "trees, path".
+std::string layers_of(GDALDataset& package) {
+  std::string names;
+  for (OGRLayer* layer : package.GetLayers())
+    names += (names.empty() ? "" : ", ") + std::string(layer->GetName());
+  return names.empty() ? "none" : names;
+}
+
 void add_fields(OGRLayer& from, OGRLayer& to, bool points, const fs::path& path) {
   for (int k = 0; k < from.GetLayerDefn()->GetFieldCount(); ++k)
     if (to.CreateField(from.GetLayerDefn()->GetFieldDefn(k)) != OGRERR_NONE) fail_to_write(path);
@@ -76,7 +84,9 @@ std::size_t write_geojson(const fs::path& package, const std::string& layer, con
       GDALDataset::Open(package.c_str(), GDAL_OF_VECTOR | GDAL_OF_READONLY));
   if (source == nullptr) throw InputError(package.string(), "", "expected a GeoPackage");
   OGRLayer* from = source->GetLayerByName(layer.c_str());
-  if (from == nullptr) throw InputError(package.string(), "", "expected a layer `" + layer + "`");
+  if (from == nullptr)
+    throw InputError(package.string(), "",
+                     "expected a layer `" + layer + "`: the file has " + layers_of(*source));
   const auto way = way_to_globe(*from, package);
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("GeoJSON");
   if (driver == nullptr) throw InternalError("this GDAL has no driver GeoJSON");

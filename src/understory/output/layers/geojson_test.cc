@@ -39,6 +39,26 @@ TEST(GeoJson, PlacesAreLongitudeAndLatitude) {
   EXPECT_TRUE(feature["properties"]["height_m"].is_null());
 }
 
+TEST(GeoJson, CrownsArePolygons) {
+  const test::TemporaryFolder folder;
+  Tree tree;
+  tree.id = 5;
+  TreeLayers layers;
+  layers.crowns = {{5, {{{400000.0, 6650000.0}, {400004.0, 6650000.0}, {400004.0, 6650003.0}}}}};
+  write_trees_gpkg(folder / "trees.gpkg", {tree}, "EPSG:3067", layers);
+  EXPECT_EQ(write_geojson(folder / "trees.gpkg", "crowns", folder / "crowns.geojson"), 1U);
+  std::ifstream file(folder / "crowns.geojson");
+  const nlohmann::json feature = nlohmann::json::parse(file)["features"].at(0);
+  EXPECT_EQ(feature["properties"]["tree_id"], 5);
+  EXPECT_EQ(feature["geometry"]["type"], "Polygon") << "of one part";
+  const auto& ring = feature["geometry"]["coordinates"].at(0);
+  EXPECT_EQ(ring.size(), 4U) << "closed";
+  for (const auto& corner : ring) {
+    EXPECT_NEAR(corner.at(0).get<double>(), 25.2, 0.2);
+    EXPECT_NEAR(corner.at(1).get<double>(), 60.0, 0.1);
+  }
+}
+
 TEST(GeoJson, WithoutAPlaceOnTheGlobeThereIsNone) {
   const test::TemporaryFolder folder;
   write_trees_gpkg(folder / "trees.gpkg", {Tree{}}, "");

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <unordered_map>
 
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/output/copc/copc_writer.h"
+#include "understory/output/layers/crown_outlines.h"
 #include "understory/output/layers/qgis_project.h"
 
 namespace understory {
@@ -109,12 +111,39 @@ void ask_for_copc(LasOptions& options, Log& log) {
            "axes, and the coordinate system has degrees. Choose one in metres by --crs");
 }
 
+std::vector<CrownOutline> crowns_in(const LayerFrame& layers, std::vector<CrownOutline> crowns,
+                                    const std::vector<Tree>& trees) {
+  if (layers.is_world()) return crowns;
+  std::unordered_map<int, double> ground;
+  for (const Tree& tree : trees)
+    ground.emplace(tree.id, std::isfinite(tree.z) ? tree.z : 0.0);
+  for (CrownOutline& crown : crowns) {
+    const double z = ground.at(crown.tree);
+    for (PlaneRing& ring : crown.rings)
+      for (Eigen::Vector2d& point : ring)
+        point = layers.from_world({point.x(), point.y(), z}).head<2>();
+  }
+  return crowns;
+}
+
 void write_tree_layers(const std::filesystem::path& folder, const std::vector<Tree>& trees,
+                       const std::vector<StampedPose>& path, const LayerFrame& layers) {
+  TreeLayers drawn;
+  drawn.path = path_in(layers, path);
+  drawn.heights = layers.heights();
+  write_trees_gpkg(folder / "trees.gpkg", trees_in(layers, trees), layers.wkt(), drawn);
+}
+
+void write_tree_layers(const std::filesystem::path& folder, const InventoryResult& inventory,
                        const std::vector<StampedPose>& path, const LayerFrame& layers,
-                       const std::vector<LookAgain>& look_again,
                        const std::vector<StandPlot>& plots) {
-  write_trees_gpkg(folder / "trees.gpkg", trees_in(layers, trees), layers.wkt(),
-                   path_in(layers, path), layers.heights(), looks_in(layers, look_again), plots);
+  TreeLayers drawn;
+  drawn.path = path_in(layers, path);
+  drawn.look_again = looks_in(layers, inventory.look_again);
+  drawn.plots = plots;
+  drawn.crowns = crowns_in(layers, crown_outlines(inventory), inventory.trees);
+  drawn.heights = layers.heights();
+  write_trees_gpkg(folder / "trees.gpkg", trees_in(layers, inventory.trees), layers.wkt(), drawn);
 }
 
 void write_raster_layers(const std::filesystem::path& folder, const Raster& terrain,

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/forest/doubtful_trees.h"
+#include "understory/forest/inventory.h"
 #include "understory/geometry/raster.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/georeference/systems/layer_frame.h"
@@ -36,12 +36,18 @@ void ask_for_copc(LasOptions& options, Log& log);
 [[nodiscard]] std::vector<LookPoint> looks_in(const LayerFrame& layers,
                                               const std::vector<LookAgain>& places);
 
-// Writes trees.gpkg with the layers trees, path and look_again (frame of all: world), and plots.
-// Throws OutputError.
+// Crowns of the world frame in that of the layers. Their outlines lie at the ground of the trees.
+[[nodiscard]] std::vector<CrownOutline> crowns_in(const LayerFrame& layers,
+                                                  std::vector<CrownOutline> crowns,
+                                                  const std::vector<Tree>& trees);
+
+// Writes trees.gpkg with the layers trees and path (frame of both: world). Throws OutputError.
 void write_tree_layers(const std::filesystem::path& folder, const std::vector<Tree>& trees,
+                       const std::vector<StampedPose>& path, const LayerFrame& layers);
+// The same with the layers look_again, plots and crowns of an inventory.
+void write_tree_layers(const std::filesystem::path& folder, const InventoryResult& inventory,
                        const std::vector<StampedPose>& path, const LayerFrame& layers,
-                       const std::vector<LookAgain>& look_again = {},
-                       const std::vector<StandPlot>& plots = {});
+                       const std::vector<StandPlot>& plots);
 
 // Writes dtm.tif, and chm.tif and dsm.tif where the canopy is not empty, over cells of the layers'
 // grid. `change` leads there from the frame of the rasters. Throws OutputError.

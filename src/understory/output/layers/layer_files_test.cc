@@ -38,7 +38,9 @@ TEST(LayerFiles, PlacesToLookFromAgainAreALayer) {
   look.towards = {-3.0, 0.0};
   look.trees = {5, 2};
   look.unseen_sides = 1;
-  write_tree_layers(folder.path(), {}, {}, layers, {look});
+  InventoryResult inventory;
+  inventory.look_again = {look};
+  write_tree_layers(folder.path(), inventory, {}, layers, {});
   const QuietGdal quiet;
   const GDALDatasetUniquePtr dataset(
       GDALDataset::Open((folder / "trees.gpkg").c_str(), GDAL_OF_VECTOR));
@@ -57,7 +59,7 @@ TEST(LayerFiles, PlacesToLookFromAgainAreALayer) {
   // West of the world is 270 degrees; the world is turned by 0.4 rad against the clock, and grid
   // north by up to 3 degrees.
   EXPECT_NEAR(row->GetFieldAsDouble("bearing_deg"), 270.0 - 0.4 * 180.0 / M_PI, 3.0);
-  write_tree_layers(folder.path(), {}, {}, layers);
+  write_tree_layers(folder.path(), std::vector<Tree>(), {}, layers);
   const GDALDatasetUniquePtr without(
       GDALDataset::Open((folder / "trees.gpkg").c_str(), GDAL_OF_VECTOR));
   EXPECT_EQ(without->GetLayerByName("look_again"), nullptr) << "nothing to look at";
@@ -149,7 +151,9 @@ TEST(QgisProject, OpensWhatIsThereByRelativePaths) {
   const test::TemporaryFolder folder;
   LookAgain look;
   look.place = {1.0, 2.0, 3.0};
-  write_tree_layers(folder.path(), {}, walk(), at_evo(0.0), {look});
+  InventoryResult inventory;
+  inventory.look_again = {look};
+  write_tree_layers(folder.path(), inventory, walk(), at_evo(0.0), {});
   write_layer_project(folder.path(), "walk", walk(), at_evo(0.0));
   EXPECT_NE(read_text_file(folder / "map.qgs").find("layername=look_again</datasource>"),
             std::string::npos);

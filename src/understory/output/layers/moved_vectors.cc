@@ -158,7 +158,7 @@ void add_moved_vectors(const std::filesystem::path& from_file, const std::filesy
   GDALDatasetUniquePtr target(GDALDataset::Open(to_file.c_str(), GDAL_OF_VECTOR | GDAL_OF_UPDATE));
   if (target == nullptr) fail_at(to_file);
   const Mover mover(move, mean_height(*source));
-  for (const char* name : {"plots", "look_again"}) {
+  for (const char* name : {"plots", "look_again", "crowns"}) {
     OGRLayer* own = source->GetLayerByName(name);
     if (own == nullptr) continue;
     OGRLayer& layer = layer_like(*own, *target, move.to, to_file);

@@ -54,7 +54,10 @@ TEST(MovedVectors, PlotsAndPlacesGoWithTheRun) {
   look.towards = {0.0, 4.0};  // along the y axis
   look.trees = {5, 2};
   look.unseen_sides = 2;
-  write_tree_layers(own, {tree_at_height(2.0)}, {}, local, {look}, {circle_at(10.0, 20.0)});
+  InventoryResult inventory;
+  inventory.trees = {tree_at_height(2.0)};
+  inventory.look_again = {look};
+  write_tree_layers(own, inventory, {}, local, {circle_at(10.0, 20.0)});
   const Pose motion(so3_exp(Vector3d(0.0, 0.0, 0.5)), Vector3d(100.0, 50.0, 1.0));
   const LayerFrame layers(Pose(), {61.2, 24.7, 150.0}, "EPSG:3067");
   write_tree_layers(placed, {tree_at_height(3.0)}, {}, layers);
@@ -95,6 +98,38 @@ TEST(MovedVectors, PlotsAndPlacesGoWithTheRun) {
   EXPECT_NEAR(plot->GetFieldAsDouble("y"), centre.y(), 1e-3);
   EXPECT_STREQ(plot->GetFieldAsString("plot"), "A7");
   EXPECT_EQ(plot->GetFieldAsDouble("trees"), 12.0);
+}
+
+TEST(MovedVectors, CrownsGoWithTheRun) {
+  const Folders folders;
+  const auto& [both, own, placed] = folders;
+  const LayerFrame local;
+  InventoryResult inventory;
+  inventory.trees = {tree_at_height(2.0)};
+  inventory.trees[0].crown_base_m = 7.5;
+  inventory.crown_outlines = {{{1.0, 2.0}, {5.0, 2.0}, {5.0, 7.0}, {1.0, 7.0}}};
+  write_tree_layers(own, inventory, {}, local, {});
+  const Pose motion(so3_exp(Vector3d(0.0, 0.0, 0.5)), Vector3d(100.0, 50.0, 1.0));
+  const LayerFrame layers(Pose(), {61.2, 24.7, 150.0}, "EPSG:3067");
+  write_tree_layers(placed, {tree_at_height(3.0)}, {}, layers);
+  add_moved_vectors(own / "trees.gpkg", placed / "trees.gpkg", {local, motion, layers});
+  const QuietGdal quiet;
+  const GDALDatasetUniquePtr dataset(
+      GDALDataset::Open((placed / "trees.gpkg").c_str(), GDAL_OF_VECTOR));
+  OGRLayer* crowns = dataset->GetLayerByName("crowns");
+  ASSERT_NE(crowns, nullptr);
+  EXPECT_STREQ(crowns->GetSpatialRef()->GetAuthorityCode(nullptr), "3067");
+  const OGRFeatureUniquePtr crown(crowns->GetNextFeature());
+  ASSERT_NE(crown, nullptr);
+  EXPECT_EQ(crown->GetFieldAsInteger("tree_id"), 1);
+  EXPECT_EQ(crown->GetFieldAsDouble("crown_base_m"), 7.5);
+  const OGRMultiPolygon& shape = *crown->GetGeometryRef()->toMultiPolygon();
+  OGRPoint middle;
+  shape.Centroid(&middle);
+  const Vector3d expected = layers.exact_from_world(motion * Vector3d(3.0, 4.5, 2.0));
+  EXPECT_NEAR(middle.getX(), expected.x(), 0.01);
+  EXPECT_NEAR(middle.getY(), expected.y(), 0.01);
+  EXPECT_NEAR(shape.get_Area(), 20.0, 0.05);
 }
 
 TEST(MovedVectors, WhatIsNotThereLeavesThePackageAsItIs) {

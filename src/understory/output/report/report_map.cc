@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "understory/forest/trees/tree_doubt.h"
+#include "understory/output/layers/crown_outlines.h"
 #include "understory/output/report/map_view.h"
 #include "understory/output/report/png.h"
 #include "understory/output/report/report_parts.h"
@@ -128,6 +129,25 @@ std::string trees_svg(const std::vector<Tree>& trees, const MapView& view) {
   return svg + "</g>";
 }
 
+// Outlines of the crowns, for the moving map: the still picture does not show them.
+std::string crowns_svg(const InventoryResult& inventory, const MapView& view) {
+  std::string svg;
+  const auto out = std::back_inserter(svg);
+  for (const CrownOutline& crown : crown_outlines(inventory)) {
+    const double ground = inventory.trees[static_cast<std::size_t>(crown.tree) - 1].z;
+    fmt::format_to(out, "<path data-id=\"{}\" d=\"", crown.tree);
+    for (const PlaneRing& ring : crown.rings) {
+      for (std::size_t i = 0; i < ring.size(); ++i) {
+        const Eigen::Vector2d at = view.at(Eigen::Vector3d(ring[i].x(), ring[i].y(), ground));
+        fmt::format_to(out, "{}{:.1f} {:.1f}", i == 0 ? "M" : "L", at.x(), at.y());
+      }
+      svg += "z";
+    }
+    svg += "\"/>";
+  }
+  return svg.empty() ? "" : "<g class=\"crowns\" display=\"none\">" + svg + "</g>";
+}
+
 // Where trees stood that are gone.
 std::string falls_svg(const std::vector<TreeFall>& falls, const MapView& view) {
   std::string svg =
@@ -231,6 +251,7 @@ std::string map_svg(const ReportInput& input, const MapView& view) {
       view.per_metre(), grid ? " data-grid=\"\"" : "");
   if (input.picture != nullptr && !input.picture->empty()) svg += picture_svg(*input.picture, view);
   if (input.inventory != nullptr) svg += thin_svg(*input.inventory, view);
+  if (input.inventory != nullptr) svg += crowns_svg(*input.inventory, view);
   if (const std::vector<Tree>* trees = report_trees(input)) svg += trees_svg(*trees, view);
   if (!input.falls.empty()) svg += falls_svg(input.falls, view);
   svg += loops_svg(input.loops, view);

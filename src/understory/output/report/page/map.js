@@ -26,12 +26,13 @@ function readMap(svg) {
     grid: svg.hasAttribute('data-grid'),
     north: svg.querySelector('.north') !== null,
     picture: null,
-    hidden: {},
+    hidden: { crowns: true },
     trees: all('.trees circle').map((c) => ({
       id: number(c, 'data-id'), x: number(c, 'cx'), y: number(c, 'cy'), r: number(c, 'data-r'),
       text: c.textContent, look: lookOf(c),
     })),
     thin: all('.thin-area').map((p) => new Path2D(p.getAttribute('d'))),
+    crowns: all('.crowns path').map((p) => ({ id: number(p, 'data-id'), path: new Path2D(p.getAttribute('d')) })),
     stands: all('.stand').map((g) => ({
       x: number(g, 'data-x'), y: number(g, 'data-y'), text: g.querySelector('text').textContent,
     })),
@@ -56,11 +57,12 @@ function readMap(svg) {
 
 // Boxes that show and hide a layer, for those that the map has.
 function addLayers(map, moving, frame) {
-  const layers = [['thin', 'thin coverage', map.thin], ['stands', 'walk here', map.stands]];
+  const layers = [['thin', 'thin coverage', map.thin], ['stands', 'walk here', map.stands], ['crowns', 'crowns', map.crowns]];
   const row = makeElement('p', { class: 'layers' });
   layers.filter(([, , parts]) => parts.length > 0).forEach(([name, text]) => {
     const label = makeElement('label');
-    const box = makeElement('input', { type: 'checkbox', checked: '' });
+    const box = makeElement('input', { type: 'checkbox' });
+    box.checked = !map.hidden[name];
     box.addEventListener('change', () => {
       map.hidden[name] = !box.checked;
       moving.repaint();

@@ -64,6 +64,7 @@ class MapPainter {
     this.paintPicture();
     if (!this.map.hidden.thin) this.paintThin(ratio);
     if (this.map.grid) this.paintGrid();
+    this.paintCrowns(ratio);
     this.paintTrees(ratio);
     this.paintLines(ratio);
     this.paintSigns();
@@ -112,6 +113,26 @@ class MapPainter {
       pen.drawImage(stamp, at[0] - size / 2, at[1] - size / 2, size, size);
     });
     pen.globalAlpha = 1;
+  }
+
+  // Outlines of crowns: that of the chosen tree, and all where they are asked for.
+  paintCrowns(ratio) {
+    const { pen, view, map } = this;
+    const k = view.scale * ratio;
+    pen.save();
+    pen.setTransform(k, 0, 0, k, -view.x * k, -view.y * k);
+    const stroke = (crown, colour, width) => {
+      pen.strokeStyle = colour;
+      pen.lineWidth = width / view.scale;
+      pen.stroke(crown.path);
+    };
+    const shown = map.hidden.crowns ? [] : map.crowns.filter((crown) => selection.isShown(crown.id));
+    shown.forEach((crown) => stroke(crown, '#14532d', 1.2));
+    map.crowns.filter((crown) => crown.id === selection.tree).forEach((crown) => {
+      stroke(crown, '#fff', 5);
+      stroke(crown, '#0b5fb0', 2.5);
+    });
+    pen.restore();
   }
 
   paintLines(ratio) {

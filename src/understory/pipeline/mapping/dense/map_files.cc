@@ -107,8 +107,7 @@ std::uint64_t write_map(const ReadRecording& recording, const DenseMappingConfig
                   obstacles ? &*obstacles : nullptr, recording.progress);
   if (obstacles) obstacles->commit(inventory.ground.terrain, frames.layers);
   write_tree_tables(folder, inventory);
-  write_tree_layers(folder, inventory.trees, trajectory, frames.layers, inventory.look_again,
-                    made.figures.table.plots);
+  write_tree_layers(folder, inventory, trajectory, frames.layers, made.figures.table.plots);
   if (asks_for_plots(made.figures.table.config)) write_plot_tables(folder, made.figures.table);
   write_raster_layers(folder, inventory.ground.terrain, inventory.canopy,
                       change_into(frames.layers), frames.layers);
