@@ -98,6 +98,9 @@ inline constexpr double kPlaneMedians = 2.5;
 }  // namespace cloud_shape
 
 namespace inventory {  // forest/inventory.cc
+// m that a radius gains per metre between two scans of half a stem, by the outline's measure of
+// that distance [tuned on clouds made by hand: 0.38, 0.43 and 0.45 at 3, 6 and 10 cm]
+inline constexpr double kThickPerApart = 0.45;
 // m: edge of the cells that the area of a stand is counted in [chosen]
 inline constexpr double kAreaCell = 2.0;
 // m above the ground: higher points are no tree [bound: the tallest trees have 116 m]

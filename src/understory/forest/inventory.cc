@@ -13,7 +13,9 @@
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/tiles/stem_tiles.h"
+#include "understory/forest/trees/double_images.h"
 #include "understory/forest/trees/tree_crowns.h"
+#include "understory/forest/trees/tree_doubt.h"
 #include "understory/forest/trees/tree_heights.h"
 
 namespace understory {
@@ -286,6 +288,33 @@ void describe(ConfigTable& table, InventoryConfig& config) {
 
 namespace {
 
+// Whether the cloud shows its stems twice: their diameters are less sure then, and the list is not
+// to be trusted.
+DoubleImages judge_images(InventoryResult& result) {
+  DoubleImages images = find_double_images(result.stems);
+  for (std::size_t i = 0; i < result.stems.size(); ++i) {
+    const double too_thick = kThickPerApart * images.oval_m[i];
+    result.stems[i].covariance(2, 2) += too_thick * too_thick;
+  }
+  result.two_images = complaint_of(images);
+  return images;
+}
+
+// The words for each tree that are no measurement.
+void describe_trees(const InventoryConfig& config, const DoubleImages& images,
+                    InventoryResult& result) {
+  const TaperSpecies species = config.curves.species != TaperSpecies::kUnknown
+                                   ? config.curves.species
+                                   : config.stand.species;
+  for (std::size_t i = 0; i < result.trees.size(); ++i) {
+    Tree& tree = result.trees[i];
+    if (species != TaperSpecies::kUnknown) tree.species = taper_species_name(species);
+    const bool stem = i < result.stems.size();
+    tree.quality = quality_of(tree, stem ? result.stems[i].arc_deg : Tree::kUnknown);
+    if (stem && images.twice[i] != 0) tree.quality = "twice";
+  }
+}
+
 // What is known of the scanner beside its points.
 struct KnownScanner {
   const Lookouts& lookouts;
@@ -321,6 +350,7 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
   result.area_m2 = area_of(result.canopy);
   judge_density(gathered, scanner.places, result);
   result.seen = seen_of(gathered.seen, scanner.places, config.stand.reach_m, result);
+  const DoubleImages images = judge_images(result);
   std::vector<double> heights;
   for (std::size_t i = 0; i < result.stems.size(); ++i)
     heights.push_back(listed(i, tops.top_m[i]));
@@ -333,6 +363,7 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
     find_crowns(task, tops.cubes, result);
     add_crowns(config, result);
   }
+  describe_trees(config, images, result);
   look_at_doubtful_trees(std::move(tops.sheets), result);
 }
 

@@ -81,6 +81,7 @@ struct InventoryResult {
   std::uint64_t points = 0;
   double area_m2 = 0.0;     // squares of 2 m that hold points
   VisibleArea seen;         // where stems could be seen; empty of a cloud from above and of a cut
+  std::string two_images;   // why its scans do not lie on each other; empty: nothing says so
   bool too_sparse = false;  // for stems: some are missing from the list
   bool from_above = false;  // too sparse, as hardly any of its points lie near breast height
   std::vector<std::string> remarks;

@@ -44,9 +44,13 @@ TEST(Inventory, AFullOneHasCurvesVolumesCrownsAndTheTreeOfEachPoint) {
   plot.add_ground(18.0, 40);
   plot.add_stem({5.0, 9.0, 0.3});
   plot.add_stem({12.0, 9.0, 0.2});
-  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  InventoryConfig config;
+  config.stand.species = TaperSpecies::kSpruce;
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), config);
   ASSERT_EQ(result.trees.size(), 2U);
   ASSERT_EQ(result.curves.size(), 2U);
+  EXPECT_EQ(result.trees[1].species, "spruce");
+  EXPECT_EQ(result.trees[1].quality, "good");
   ASSERT_TRUE(result.owners);
   for (std::size_t i = 0; i < 2; ++i) {
     const Tree& tree = result.trees[i];
@@ -458,6 +462,8 @@ TEST(Inventory, AnAirborneCloudHasTreesByTheirCrowns) {
     EXPECT_NEAR(tree.height_m, 16.0, 0.5);
     EXPECT_NEAR(tree.crown_area_m2, M_PI * 9.0, 4.0);
     EXPECT_TRUE(std::isnan(tree.dbh_m));
+    EXPECT_EQ(tree.quality, "no_diameter");
+    EXPECT_EQ(tree.species, "");
     const Eigen::Vector3d in_crown(places[i].x() + 1.0, places[i].y(), tree.z + 12.0);
     EXPECT_EQ(tree_at(result, in_crown, 12.0), static_cast<std::uint32_t>(tree.id));
     EXPECT_EQ(tree_at(result, in_crown, 1.0), 0U) << "what is low below a crown may be undergrowth";

@@ -293,6 +293,12 @@ inline constexpr double kThinTryFill = 0.7;
 inline constexpr double kThinTryArc = 0.5;
 // Share of points off the surface that a thin stem may have more [not recorded]
 inline constexpr double kThinStrays = 0.05;
+// Steps of 10 degrees that hold points on a stem seen all round ... [chosen]
+inline constexpr double kOvalBins = 30.0;
+// ... degrees over which these points would spread if they lay evenly ... [tuned on random 8]
+inline constexpr double kOvalEvenDeg = 220.0;
+// ... and their scatter as a share of the radius at most [tuned on random 8]
+inline constexpr double kOvalScatter = 0.2;
 }  // namespace stem_fit
 
 namespace beam_footprint {  // forest/stems/beam_footprint.cc

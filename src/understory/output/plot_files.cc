@@ -20,17 +20,8 @@ Eigen::Vector2d middle_of(const PlotShape& shape) {
   return 0.5 * (box.head<2>() + box.tail<2>());
 }
 
-// A text as a cell: in quotes where it holds a comma, a quote or a line's end.
-std::string text_cell(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text)
-    quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
-
 std::string row_of(const StandPlot& plot) {
-  std::string row = text_cell(plot.shape.id) + "," + plot.shape.kind;
+  std::string row = csv_text(plot.shape.id) + "," + plot.shape.kind;
   for (const PlotColumn& column : plot_columns())
     row += "," + csv_cell(column.value(plot), column.decimals);
   return row + "\n";
@@ -40,7 +31,7 @@ std::string classes_of_plot(const StandPlot& plot) {
   std::string rows;
   for (const DiameterClass& one : plot.figures.classes)
     rows += fmt::format(
-        "{},{:.3f},{:.3f},{},{},{},{},{}\n", text_cell(plot.shape.id), one.from_m, one.to_m,
+        "{},{:.3f},{:.3f},{},{},{},{},{}\n", csv_text(plot.shape.id), one.from_m, one.to_m,
         one.trees, csv_cell(one.stems_per_ha.value, 2), csv_cell(one.stems_per_ha.sd, 2),
         csv_cell(one.basal_area_m2_per_ha.value, 4), csv_cell(one.basal_area_m2_per_ha.sd, 4));
   return rows;

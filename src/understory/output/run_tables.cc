@@ -38,17 +38,6 @@ void append_upper_triangle(std::string& line, const Matrix& matrix, const char* 
   }
 }
 
-// A text cell of a CSV file, quoted where it has to be.
-std::string quoted(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"') result += '"';
-    result += c == '\n' || c == '\r' ? ' ' : c;
-  }
-  return result + '"';
-}
-
 }  // namespace
 
 TumWriter::TumWriter(const std::filesystem::path& path) : file_(path) {}
@@ -110,7 +99,7 @@ void GnssWriter::add(const GnssRow& row) {
   line += fmt::format(",{}", row.fix.quality);
   for (int i = 0; i < 3; ++i)
     put(row.residual[i], 4);
-  line += fmt::format(",{},{}", row.used ? 1 : 0, quoted(row.reason));
+  line += fmt::format(",{},{}", row.used ? 1 : 0, csv_text(row.reason));
   put(row.fix.heading_deg, 4);
   put(row.fix.heading_sd_deg, 4);
   file_.write(line + "\n");

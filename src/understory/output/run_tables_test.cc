@@ -31,6 +31,8 @@ TEST_F(RunTablesTest, TreesComeBackToTheDecimalsOfTheirColumns) {
   }
   tree.id = 7;
   tree.observations = 12;
+  tree.species = "pine, old";
+  tree.quality = "good";
   Tree unknown;
   unknown.id = 8;
   write_trees_csv(folder_ / "trees.csv", {tree, unknown});
@@ -40,6 +42,10 @@ TEST_F(RunTablesTest, TreesComeBackToTheDecimalsOfTheirColumns) {
   for (const TreeColumn& column : kTreeColumns) {
     if (const auto* whole = std::get_if<int Tree::*>(&column.member)) {
       EXPECT_EQ(table.number(column.name), tree.*(*whole)) << column.name;
+      continue;
+    }
+    if (const auto* text = std::get_if<std::string Tree::*>(&column.member)) {
+      EXPECT_EQ(table.text(column.name), tree.*(*text)) << column.name;
       continue;
     }
     const double value = tree.*std::get<double Tree::*>(column.member);

@@ -8,6 +8,8 @@ namespace {
 std::string cell_of(const Tree& tree, const TreeColumn& column, int more_decimals) {
   if (const auto* number = std::get_if<double Tree::*>(&column.member))
     return csv_cell(tree.*(*number), column.decimals + more_decimals);
+  if (const auto* text = std::get_if<std::string Tree::*>(&column.member))
+    return csv_text(tree.*(*text));
   return std::to_string(tree.*std::get<int Tree::*>(column.member));
 }
 

@@ -34,6 +34,9 @@ struct Tree {
   // Seconds on the clock of the scans: from then on views that should have seen the tree did not.
   // Unknown while it stands.
   double missing_since_s = kUnknown;
+  std::string species;  // empty where unknown
+  // How far its diameter is to be trusted, in one word (forest/trees/tree_doubt.h); empty: unknown.
+  std::string quality;
   bool felled = false;  // of a truth: cut down while it was scanned, so it may be listed or not
 };
 
@@ -41,8 +44,8 @@ struct Tree {
 // them take their columns from kTreeColumns; docs/reference/outputs.md explains each to the user.
 struct TreeColumn {
   const char* name;
-  std::variant<int Tree::*, double Tree::*> member;
-  int decimals;  // of the number in trees.csv
+  std::variant<int Tree::*, double Tree::*, std::string Tree::*> member;
+  int decimals;  // of a real number in trees.csv
   bool place;    // x, y and z: in a GeoPackage they are the point
 };
 inline constexpr std::array kTreeColumns = {
@@ -65,6 +68,8 @@ inline constexpr std::array kTreeColumns = {
     TreeColumn{"crown_area_m2", &Tree::crown_area_m2, 2, false},
     TreeColumn{"crown_volume_m3", &Tree::crown_volume_m3, 2, false},
     TreeColumn{"missing_since", &Tree::missing_since_s, 3, false},
+    TreeColumn{"species", &Tree::species, 0, false},
+    TreeColumn{"quality", &Tree::quality, 0, false},
 };
 
 // The names of the columns, and the cells of one tree, separated by commas, without the end of the

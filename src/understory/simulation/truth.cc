@@ -133,6 +133,7 @@ Tree truth_of(const GrownTree& grown, const TrueCrown& crown) {
   tree.y = grown.foot.y();
   tree.z = grown.foot.z();
   tree.dbh_m = grown.dbh_m;
+  tree.species = species_name(grown.species);
   tree.height_m = grown.height_m;
   tree.lean_deg = grown.lean_deg();
   tree.dbh_sd_m = tree.x_sd_m = tree.y_sd_m = 0.0;
@@ -176,14 +177,13 @@ std::string trees_text(const SimulatedWorld& world, TimeNs start, const TruthLog
     const TimeNs time = start + from_seconds(felling.grab_s);
     if (!scans.empty() && time < scans.back().stamp) felled[felling.tree] = format_seconds(time);
   }
-  std::string text = tree_csv_header() + ",species,felled_at\n";
+  std::string text = tree_csv_header() + ",felled_at\n";
   for (const GrownTree& grown : world.stand.trees) {
     const auto seen = observations.find(grown.id);
     const auto cut = felled.find(grown.id);
     Tree tree = truth_of(grown, crowns.of(grown));
     tree.observations = seen == observations.end() ? 0 : seen->second;
-    text += fmt::format("{},{},{}\n", tree_csv_row(tree, 1), species_name(grown.species),
-                        cut == felled.end() ? "" : cut->second);
+    text += fmt::format("{},{}\n", tree_csv_row(tree, 1), cut == felled.end() ? "" : cut->second);
   }
   return text;
 }

@@ -26,6 +26,8 @@ std::optional<int> whole_number(const CsvReader& table, const std::string& colum
 void read_cell(const CsvReader& table, const TreeColumn& column, Tree& tree) {
   if (const auto* number = std::get_if<double Tree::*>(&column.member)) {
     tree.*(*number) = table.number(column.name);
+  } else if (const auto* text = std::get_if<std::string Tree::*>(&column.member)) {
+    tree.*(*text) = table.text(column.name);
   } else if (const auto value = whole_number(table, column.name)) {
     tree.*std::get<int Tree::*>(column.member) = *value;
   }

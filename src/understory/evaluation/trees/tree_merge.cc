@@ -63,7 +63,9 @@ Tree joined(const Tree& a, const Tree& b) {
   if (better) {
     tree.dbh_m = other.dbh_m;
     tree.dbh_sd_m = other.dbh_sd_m;
+    tree.quality = other.quality;
   }
+  if (tree.species.empty()) tree.species = other.species;
   if (!std::isfinite(tree.height_m)) {
     tree.height_m = other.height_m;
     tree.height_sd_m = other.height_sd_m;

@@ -142,6 +142,9 @@ TEST(TreeMerge, AJoinedTreeKeepsWhatTheSurerKnows) {
   b.dbh_sd_m = 0.05;
   b.height_m = 17.0;
   b.missing_since_s = 90.5;
+  a.species = "pine";
+  a.quality = "good";
+  b.quality = "one_side";
   TreeMergeConfig config;
   config.smoothing = 0;
   const MergedTrees merged = merge_trees({a}, {b}, 0.5, config);
@@ -150,6 +153,8 @@ TEST(TreeMerge, AJoinedTreeKeepsWhatTheSurerKnows) {
   EXPECT_EQ(merged.trees[0].observations, 33);
   EXPECT_DOUBLE_EQ(merged.trees[0].dbh_m, 0.30);
   EXPECT_DOUBLE_EQ(merged.trees[0].height_m, 17.0);
+  EXPECT_EQ(merged.trees[0].quality, "good") << "that of the diameter";
+  EXPECT_EQ(merged.trees[0].species, "pine");
   EXPECT_DOUBLE_EQ(merged.trees[0].missing_since_s, 90.5);
   a.missing_since_s = 60.0;
   EXPECT_DOUBLE_EQ(merge_trees({a}, {b}, 0.5, config).trees[0].missing_since_s, 60.0);

@@ -13,6 +13,7 @@
 #include "understory/forest/slice/slice_stems.h"
 #include "understory/forest/slice/slice_thinner.h"
 #include "understory/forest/stems/stem_axis.h"
+#include "understory/forest/trees/tree_doubt.h"
 #include "understory/forest/trees/tree_sheets.h"
 #include "understory/util/error.h"
 
@@ -170,6 +171,8 @@ InventoryResult take_slice(const PointBlocks& unasked, const std::string& name,
   for (const SliceStem& slice : stems) {
     result.stems.push_back(slice.stem);
     result.trees.push_back(tree_of(result, slice.stem, static_cast<int>(result.stems.size())));
+    Tree& tree = result.trees.back();
+    tree.quality = slice.rings_apart_m > 0.0 ? "two_rings" : quality_of(tree, slice.stem.arc_deg);
   }
   result.area_m2 = area_of(result.slices);
   result.sheets = SheetCollector(result.stems, result.slices, most_doubtful(result.stems)).take();

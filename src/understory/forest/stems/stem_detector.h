@@ -59,8 +59,11 @@ struct StemFit {
   double below_sd_m = 0.0;  // of the radius: how the taper may differ below what was seen
   double rms_m = 0.0;       // of the points on the surface
   double arc_deg = 0.0;     // covered by points
-  int returns = 0;          // of the cloud
-  double lowest_m = 0.0;    // first and last height with points on the surface
+  // How its outline differs from a circle: metres that the second harmonic adds to the radius, as a
+  // vector of twice its direction. NaN where it was not seen all round.
+  Eigen::Vector2d oval = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  int returns = 0;        // of the cloud
+  double lowest_m = 0.0;  // first and last height with points on the surface
   double highest_m = 0.0;
   BeamFootprint beam;          // of the beams that met it, where they are known
   double beam_excess_m = 0.0;  // what these added to the radius, and was taken away from it

@@ -153,6 +153,34 @@ class Patches {
   int points_ = 0;
 };
 
+// The outline of a stem as it lies over the surface that was fitted, by steps of 10 degrees.
+class Outline {
+ public:
+  void add(const AxisPlace& place, double error_m, double weight) {
+    const std::size_t bin = ArcBins::bin_of(place.outward.x(), place.outward.y());
+    errors_[bin] += weight * error_m;
+    weights_[bin] += weight;
+  }
+  // See StemFit::oval.
+  [[nodiscard]] Eigen::Vector2d oval() const {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    double bins = 0.0;
+    for (std::size_t b = 0; b < ArcBins::kBins; ++b) {
+      if (weights_[b] <= 0.0) continue;
+      const double turn =
+          2.0 * (static_cast<double>(b) + 0.5) * 2.0 * M_PI / static_cast<double>(ArcBins::kBins);
+      sum += errors_[b] / weights_[b] * Eigen::Vector2d(std::cos(turn), std::sin(turn));
+      ++bins;
+    }
+    if (bins < kOvalBins) return StemFit().oval;
+    return 2.0 / bins * sum;
+  }
+
+ private:
+  std::array<double, ArcBins::kBins> errors_{};
+  std::array<double, ArcBins::kBins> weights_{};
+};
+
 // What speaks for and against the stem, and how much of it was seen.
 void judge(const std::vector<SlicePoint>& points, const StemDetectorConfig& config,
            StemFitResult& result) {
@@ -163,6 +191,7 @@ void judge(const std::vector<SlicePoint>& points, const StemDetectorConfig& conf
   const double band = std::max(kBandScatters * scatter, kLeastBand);
   const double within = -std::max(kInsideBands * band, kInsideShare * stem.radius_m);
   ArcBins arc;
+  Outline outline;
   Patches patches(config);
   int inner = 0;
   int outer = 0;
@@ -180,6 +209,7 @@ void judge(const std::vector<SlicePoint>& points, const StemDetectorConfig& conf
     ++evidence.on;
     evidence.returns += static_cast<int>(point.returns);
     squares += e * e;
+    outline.add(place, e, static_cast<double>(point.returns));
     arc.add(place.outward.x(), place.outward.y());
     const auto height = static_cast<double>(point.height_m);
     patches.add(height, place);
@@ -201,6 +231,9 @@ void judge(const std::vector<SlicePoint>& points, const StemDetectorConfig& conf
     evidence.outside_ratio = outer_density / on_density;
   }
   stem.arc_deg = arc.covered_deg();
+  // The scatter of points along one line of sight would pass for an outline.
+  const bool all_round = arc.even_deg() >= kOvalEvenDeg && scatter <= kOvalScatter * stem.radius_m;
+  stem.oval = all_round ? outline.oval() : StemFit().oval;
   evidence.even_arc_deg = arc.even_deg();
   stem.returns = evidence.returns;
   stem.rms_m = evidence.on > 0 ? std::sqrt(squares / evidence.on) : 0.0;

@@ -26,6 +26,12 @@ StandDoubts doubts_of(const std::vector<Tree>& trees) {
   return doubts;
 }
 
+std::string quality_of(const Tree& tree, double arc_deg) {
+  if (!std::isfinite(tree.dbh_m)) return "no_diameter";
+  if (has_weak_diameter(tree)) return "weak_diameter";
+  return arc_deg < kHalfTurn ? "one_side" : "good";
+}
+
 double doubt_of(const Tree& tree, double arc_deg) {
   double doubt = std::isfinite(tree.height_m) ? 0.0 : kNoHeight;
   if (!std::isfinite(tree.dbh_m)) return doubt + kNoDiameter;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "understory/sensor/tree.h"
@@ -20,6 +21,15 @@ struct StandDoubts {
   std::size_t by_crown = 0;  // found by their crowns alone, without a diameter
 };
 [[nodiscard]] StandDoubts doubts_of(const std::vector<Tree>& trees);
+
+// How far the diameter of a tree is to be trusted, in one word for a table, the worst that applies:
+// - "no_diameter": it was found by its crown alone,
+// - "weak_diameter": see has_weak_diameter,
+// - "one_side": less than half of its circumference was seen,
+// - "good": none of these.
+// A cut has "two_rings" as well (slice/slice_stems.h), a cloud "twice" (trees/double_images.h).
+// `arc_deg`: as of doubt_of.
+[[nodiscard]] std::string quality_of(const Tree& tree, double arc_deg);
 
 // How doubtful a tree is, to sort trees by it: larger is worse, 0 is certain. The relative standard
 // deviation of the diameter over 30 %, plus the share of the circumference beyond a half that was

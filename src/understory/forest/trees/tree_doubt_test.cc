@@ -27,6 +27,16 @@ TEST(TreeDoubt, CountsWhatIsNotToBeTrusted) {
   EXPECT_EQ(doubts.by_crown, 1U);
 }
 
+TEST(TreeDoubt, QualityIsTheWorstThatIsKnownOfADiameter) {
+  EXPECT_EQ(quality_of(tree_with_sd(0.2, 0.01, 12.0), 200.0), "good");
+  EXPECT_EQ(quality_of(tree_with_sd(0.2, 0.01, kUnknown), kUnknown), "good")
+      << "a height counts not";
+  EXPECT_EQ(quality_of(tree_with_sd(0.2, kUnknown, 12.0), 180.0), "good");
+  EXPECT_EQ(quality_of(tree_with_sd(0.2, 0.01, 12.0), 179.0), "one_side");
+  EXPECT_EQ(quality_of(tree_with_sd(0.2, 0.061, 12.0), 100.0), "weak_diameter");
+  EXPECT_EQ(quality_of(tree_with_sd(kUnknown, kUnknown, 12.0), kUnknown), "no_diameter");
+}
+
 TEST(TreeDoubt, SortsByDiameterThenArcThenHeight) {
   const double good = doubt_of(tree_with_sd(0.3, 0.01, 20.0), 350.0);
   EXPECT_NEAR(good, 0.01 / 0.09, 1e-12);

@@ -70,8 +70,18 @@ void set_field(OGRFeature& feature, const TreeColumn& column, const Tree& tree) 
     feature.SetField(column.name, tree.*(*whole));
     return;
   }
+  if (const auto* text = std::get_if<std::string Tree::*>(&column.member)) {
+    if (!(tree.*(*text)).empty()) feature.SetField(column.name, (tree.*(*text)).c_str());
+    return;
+  }
   const double value = tree.*std::get<double Tree::*>(column.member);
   if (std::isfinite(value)) feature.SetField(column.name, value);
+}
+
+OGRFieldType type_of(const TreeColumn& column) {
+  return std::holds_alternative<int Tree::*>(column.member)           ? OFTInteger
+         : std::holds_alternative<std::string Tree::*>(column.member) ? OFTString
+                                                                      : OFTReal;
 }
 
 }  // namespace
@@ -145,8 +155,9 @@ OGRLayer* add_layer(GDALDataset& dataset, const char* name, OGRwkbGeometryType t
   return layer;
 }
 
-void add_field(OGRLayer& layer, const char* name, bool whole, const std::filesystem::path& path) {
-  OGRFieldDefn field(name, whole ? OFTInteger : OFTReal);
+void add_field(OGRLayer& layer, const char* name, OGRFieldType type,
+               const std::filesystem::path& path) {
+  OGRFieldDefn field(name, type);
   if (layer.CreateField(&field) != OGRERR_NONE) fail(path);
 }
 
@@ -182,10 +193,11 @@ void add_looks(GDALDataset& dataset, const std::vector<LookPoint>& looks,
                               "where to stand to measure doubtful stems again", path);
   for (const char* name : {"trees", "tree_ids", "bearing_deg", "reason"}) {
     const std::string text = name;
-    OGRFieldDefn field(name, text == "trees"         ? OFTInteger
-                             : text == "bearing_deg" ? OFTReal
-                                                     : OFTString);
-    if (layer->CreateField(&field) != OGRERR_NONE) fail(path);
+    add_field(*layer, name,
+              text == "trees"         ? OFTInteger
+              : text == "bearing_deg" ? OFTReal
+                                      : OFTString,
+              path);
   }
   for (const LookPoint& look : looks) {
     const std::unique_ptr<OGRFeature> feature(new OGRFeature(layer->GetLayerDefn()));
@@ -203,12 +215,10 @@ void add_looks(GDALDataset& dataset, const std::vector<LookPoint>& looks,
 }
 
 void add_plot_fields(OGRLayer& layer, const std::filesystem::path& path) {
-  for (const char* name : {"plot", "kind"}) {
-    OGRFieldDefn field(name, OFTString);
-    if (layer.CreateField(&field) != OGRERR_NONE) fail(path);
-  }
+  for (const char* name : {"plot", "kind"})
+    add_field(layer, name, OFTString, path);
   for (const PlotColumn& column : plot_columns())
-    add_field(layer, column.name, false, path);
+    add_field(layer, column.name, OFTReal, path);
 }
 
 OGRLinearRing closed(const PlaneRing& points) {
@@ -264,9 +274,9 @@ void add_crowns(GDALDataset& dataset, const std::vector<CrownOutline>& crowns,
   if (crowns.empty()) return;
   OGRLayer* layer = add_layer(dataset, "crowns", wkbMultiPolygon, crs_wkt,
                               "crowns of the trees, seen from above", path);
-  add_field(*layer, "tree_id", true, path);
+  add_field(*layer, "tree_id", OFTInteger, path);
   for (const TreeColumn& column : kTreeColumns)
-    if (tells_of_crown(column)) add_field(*layer, column.name, false, path);
+    if (tells_of_crown(column)) add_field(*layer, column.name, OFTReal, path);
   std::unordered_map<int, const Tree*> by_id;
   for (const Tree& tree : trees)
     by_id.emplace(tree.id, &tree);
@@ -327,15 +337,14 @@ void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>
   OGRLayer* layer = add_layer(*dataset, "trees", wkbPoint25D, crs_wkt,
                               "trees where the stem meets the ground" + above, path);
   for (const TreeColumn& column : kTreeColumns) {
-    if (!column.place)
-      add_field(*layer, column.name, std::holds_alternative<int Tree::*>(column.member), path);
+    if (!column.place) add_field(*layer, column.name, type_of(column), path);
   }
   OGRLayer* drawn = nullptr;
   if (layers.path.points.size() > 1) {
     drawn =
         add_layer(*dataset, "path", wkbLineString25D, crs_wkt, "path of the scanner" + above, path);
     for (const char* name : {"begin_s", "end_s", "length_m"})
-      add_field(*drawn, name, false, path);
+      add_field(*drawn, name, OFTReal, path);
   }
   OGRLayer* plotted = nullptr;
   if (!layers.plots.empty()) {

@@ -131,6 +131,8 @@ TEST_F(GeoFilesTest, TreesHaveAllColumns) {
   }
   known.id = 11;
   known.observations = 4321;
+  known.species = "pine";
+  known.quality = "good";
   Tree unknown;
   unknown.id = 12;
   write_trees_gpkg(folder_ / "trees.gpkg", {known, unknown}, "");
@@ -159,9 +161,13 @@ TEST_F(GeoFilesTest, TreesHaveAllColumns) {
       EXPECT_EQ(first->GetFieldAsInteger(field), known.*(*whole)) << column.name;
       continue;
     }
+    EXPECT_FALSE(second->IsFieldSetAndNotNull(field)) << column.name;
+    if (const auto* text = std::get_if<std::string Tree::*>(&column.member)) {
+      EXPECT_EQ(first->GetFieldAsString(field), known.*(*text)) << column.name;
+      continue;
+    }
     const double value = known.*std::get<double Tree::*>(column.member);
     EXPECT_DOUBLE_EQ(first->GetFieldAsDouble(field), value) << column.name;
-    EXPECT_FALSE(second->IsFieldSetAndNotNull(field)) << column.name;
   }
   EXPECT_EQ(layer->GetLayerDefn()->GetFieldCount(), columns);
 }

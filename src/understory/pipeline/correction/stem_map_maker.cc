@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "understory/forest/trees/tree_doubt.h"
 #include "understory/output/layers/layer_files.h"
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/correction_report.h"
@@ -30,6 +31,7 @@ std::vector<Tree> trees_of(const std::vector<MappedStem>& stems) {
     tree.observations = stem.sights;
     tree.x_sd_m = std::sqrt(stem.variance_m2.x() / stem.sights);
     tree.y_sd_m = std::sqrt(stem.variance_m2.y() / stem.sights);
+    tree.quality = quality_of(tree, Tree::kUnknown);
     trees.push_back(tree);
   }
   return trees;

@@ -130,6 +130,7 @@ void judge(const Stock& stock, const InventoryRequest& request, const Log& log,
     const std::string complaint = list_complaint(inventory, request.frame.unit_m > 0.0);
     if (!complaint.empty()) documents.lower(RunStatus::kUntrusted, complaint);
   }
+  if (!inventory.two_images.empty()) documents.lower(RunStatus::kUntrusted, inventory.two_images);
   const bool by_crowns = inventory.trees.size() > inventory.stems.size();
   if (!inventory.too_sparse || (inventory.from_above && by_crowns)) return;
   const bool any = !inventory.trees.empty();

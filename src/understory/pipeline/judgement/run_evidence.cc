@@ -67,6 +67,7 @@ void put_stems(Figures& figures, const StemRunEvidence& stems) {
 void put_stand(Figures& figures, const StandEvidence& stand) {
   figures["few_points_near_breast"] = stand.few_near_breast;
   figures["map_upright"] = stand.not_upright.empty();
+  figures["trees_once"] = stand.two_images.empty();
 }
 
 }  // namespace

@@ -95,6 +95,7 @@ struct StandEvidence {
   std::uint64_t trees = 0;
   bool few_near_breast = false;  // too few points near breast height to see stems reliably
   std::string not_upright;       // why z of the map is not up, in words; empty: nothing says so
+  std::string two_images;        // why the map shows trees twice, in words; empty: nothing says so
 };
 
 // Everything that the judgement of a run rests on: numbers, and words only to say where. Filled by

@@ -419,6 +419,7 @@ class Judge {
            "IMU, or bring the map upright with `understory inventory --up`");
       return;  // that there are no stems follows from it
     }
+    if (!stand.two_images.empty()) hurt(stand.two_images);
     // Around a path lie areas that were seen from afar alone, so few points in the mean are no harm
     // by themselves.
     if (stand.few_near_breast && stand.trees == 0) missing(few_points_reason(false));

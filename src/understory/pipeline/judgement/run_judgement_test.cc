@@ -154,7 +154,9 @@ TEST(RunJudgement, AMapThatIsNoGroundForAListOfTrees) {
   expect_complete(evidence);
   evidence.stand.trees = 0;
   expect(RunStatus::kPartial, "the list of trees is empty", evidence);
-  evidence.stand = {0, true, "z is not up"};
+  evidence.stand = {20, false, "", "12 of 20 trees stand twice"};
+  expect(RunStatus::kUntrusted, "12 of 20 trees stand twice", evidence);
+  evidence.stand = {0, true, "z is not up", ""};
   expect(RunStatus::kUntrusted, "the map does not stand upright: z is not up", evidence);
 }
 

@@ -102,6 +102,16 @@ std::string csv_cell(double value, int decimals) {
   return text;
 }
 
+std::string csv_text(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"') result += '"';
+    result += c == '\n' || c == '\r' ? ' ' : c;
+  }
+  return result + '"';
+}
+
 struct LineReader::Stream {
   gzFile file = nullptr;
   std::array<char, 1U << 16> buffer{};

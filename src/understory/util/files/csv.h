@@ -32,6 +32,10 @@ void split_csv(std::string_view line, std::vector<std::string_view>& cells,
 // A number with `decimals` decimals for a CSV file, empty where it is not finite; never "-0.000".
 [[nodiscard]] std::string csv_cell(double value, int decimals);
 
+// A text for a CSV file, in quotes where it holds a comma or a quote. A line's end becomes a blank:
+// a cell of this program's tables never goes over a line.
+[[nodiscard]] std::string csv_text(const std::string& text);
+
 // Changes a line as it is read.
 using LineEdit = std::function<void(std::string& line)>;
 

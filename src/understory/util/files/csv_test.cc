@@ -124,6 +124,8 @@ TEST(CsvCell, IsEmptyWhereUnknownAndNeverMinusZero) {
   EXPECT_EQ(csv_cell(1.23456, 3), "1.235");
   EXPECT_EQ(csv_cell(-0.0001, 3), "0.000");
   EXPECT_EQ(csv_cell(std::nan(""), 3), "");
+  EXPECT_EQ(csv_text("Scots pine"), "Scots pine");
+  EXPECT_EQ(csv_text("pine, \"old\"\nor dead"), "\"pine, \"\"old\"\" or dead\"");
 }
 
 }  // namespace

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+
+// Numbers of forest/trees/double_images.cc that are no settings. What the words in brackets mean:
+// stem_constants.h.
+namespace understory::double_image_constants {
+// m between the axes of two images of one tree; trees stand farther apart in most stands [bound:
+// spacing]
+inline constexpr double kMostApart = 0.6;
+// Share of their mean radius by which the radii of two images differ at most ... [chosen]
+inline constexpr double kAlikeShare = 0.15;
+// ... or standard deviations of the difference [chosen]
+inline constexpr double kAlikeSds = 2.0;
+// Share of the distance of a pair within which a third stem goes on in a row [chosen]
+inline constexpr double kRowShare = 0.3;
+// m around a pair, or a stem, in which others are asked: drift changes along the path [chosen]
+inline constexpr double kReach = 20.0;
+// Others that are asked at most, the nearest [chosen]
+inline constexpr std::size_t kMostNear = 12;
+// m by which two vectors differ at most that agree ... [tuned on clouds made by hand]
+inline constexpr double kAgree = 0.04;
+// ... or as a share of their length [tuned on clouds made by hand]
+inline constexpr double kAgreeShare = 0.25;
+// Pairs that have to agree with one, beside being most of those that are asked [chosen]
+inline constexpr std::size_t kFewestAgreeing = 4;
+// Stems seen all round that a mean outline needs [bound: statistics]
+inline constexpr std::size_t kFewestRound = 8;
+// Amplitude of an outline's second harmonic over the distance of two half circles: 2 / (3 pi)
+// [bound: geometry]
+inline constexpr double kOvalPerApart = 0.2122;
+// Standard deviations of the mean outline from a round one [chosen]
+inline constexpr double kClearSds = 4.0;
+// m between two scans that an outline shows at least: stems are not quite round ... [chosen]
+inline constexpr double kLeastOval = 0.02;
+// ... nor are thick ones: share of their diameter [chosen]
+inline constexpr double kGrownShare = 0.05;
+// Trees of a list that stand twice, from which on the list is not to be trusted ... [chosen]
+inline constexpr std::size_t kFewestTwice = 8;
+// ... and their share [chosen]
+inline constexpr double kTwiceShare = 0.1;
+// Share of the stems seen all round whose outlines tell of two scans, for the same [chosen]
+inline constexpr double kOvalShare = 0.3;
+}  // namespace understory::double_image_constants
