@@ -10,11 +10,16 @@ each RUN with the true trees of 5 cm and more on the whole plot, and pools all p
 error, root mean square error, and that of the error over its stated standard deviation (1 where the
 deviations are right). The frame of RUN must be that of the truth. A map that is made from a recording is
 not: the plots lie along the path of the run (--plots RUN). --align lays the truth on the map by the
-trees. Needs numpy.
+trees. A run on the globe has its plots in the map projection of its layers, as `inventory --plots` takes
+them. Its trees tell how both frames lie to each other: trees.gpkg and trees.csv have them. Needs numpy.
 """
 import argparse
 import csv
 import math
+import pathlib
+import sqlite3
+import struct
+import sys
 
 import inventory_table
 import numpy as np
@@ -41,8 +46,59 @@ def number(text):
     return float(text) if text else math.nan
 
 
+class LayerFrame:
+    """From the frame of a run's tables to that of its layers, in plane: a turn, a scale and a shift, metres."""
+
+    def __init__(self, folder):
+        self.turn, self.middle, self.layer_middle = 1.0 + 0.0j, 0.0j, 0.0j
+        layers = pathlib.Path(folder, "trees.gpkg")
+        if not layers.exists():
+            return
+        own, other = trees_in_both(folder, layers)
+        if len(own) and np.abs(own - other).max() < 0.01:
+            return
+        if len(own) < 2 or np.abs(own - own.mean()).max() < 1.0:
+            sys.exit(f"{layers} lies in a map projection, and fewer than two trees tell how")
+        self.middle, self.layer_middle = own.mean(), other.mean()
+        a, b = own - self.middle, other - self.layer_middle
+        self.turn = np.vdot(a, b) / np.vdot(a, a)
+        worst = np.abs(b - self.turn * a).max()
+        if worst > 0.05:
+            sys.exit(f"trees.csv and {layers} do not have the same trees: they differ by {worst:.2f} m")
+
+    def to_layers(self, places):
+        return as_rows(self.layer_middle + self.turn * (as_complex(places) - self.middle))
+
+    def from_layers(self, places):
+        return as_rows(self.middle + (as_complex(places) - self.layer_middle) / self.turn)
+
+
+def as_complex(places):
+    places = np.asarray(places, dtype=float).reshape(-1, 2)
+    return places[:, 0] + 1j * places[:, 1]
+
+
+def as_rows(numbers):
+    return np.column_stack([numbers.real, numbers.imag])
+
+
+def trees_in_both(folder, layers):
+    """Places of the same trees in trees.csv and in the layer of them, as complex numbers."""
+    with sqlite3.connect(f"file:{layers}?mode=ro", uri=True) as database:
+        rows = database.execute("SELECT id, geom FROM trees").fetchall()
+    # Bits 1 to 3 of the fourth byte name the envelope before the well-known bytes (OGC 12-128).
+    skip = (8, 40, 56, 56, 72)
+    there = {}
+    for tree, blob in rows:
+        at = skip[blob[3] >> 1 & 7]
+        there[int(tree)] = complex(*struct.unpack_from("<dd" if blob[at] else ">dd", blob, at + 5))
+    own = {int(row["id"]): complex(float(row["x"]), float(row["y"])) for row in rows_of(f"{folder}/trees.csv")}
+    both = sorted(own.keys() & there.keys())
+    return np.array([own[i] for i in both]), np.array([there[i] for i in both])
+
+
 def write_plots(folder, radius, step):
-    path = np.loadtxt(f"{folder}/trajectory.tum")[:, 1:3]
+    path = LayerFrame(folder).to_layers(np.loadtxt(f"{folder}/trajectory.tum", ndmin=2)[:, 1:3])
     print("id,x,y,radius_m")
     last = None
     count = 0
@@ -82,11 +138,13 @@ def compare(run, truth, align, errors, shares):
         rotation, shift = inventory_table.alignment(run, truth)  # from the map to the truth
         for tree in trees:
             tree["x"], tree["y"] = (rotation.T @ (np.array([tree["x"], tree["y"], tree["z"]]) - shift))[:2]
+    frame = LayerFrame(run)
     for row in rows_of(f"{run}/plots.csv"):
         if row["kind"] != "circle":
             continue
         shares.append(number(row["seen_share"]))
-        true = figures_of_truth(trees, number(row["x"]), number(row["y"]), number(row["radius_m"]))
+        ((x, y),) = frame.from_layers([[number(row["x"]), number(row["y"])]])
+        true = figures_of_truth(trees, x, y, number(row["radius_m"]))
         if shares[-1] < LEAST_SEEN or true is None:
             continue
         for name, sd in FIGURES.items():

@@ -10,6 +10,7 @@ import math
 import os
 import sqlite3
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -17,6 +18,7 @@ import laspy
 import numpy as np
 
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
+BENCHMARK = str(Path(__file__).resolve().parents[2] / "benchmarks" / "stand_table.py")
 EAST, NORTH = 500_000.0, 6_900_000.0  # of the cloud's south-west corner
 SIDE = 30.0
 STEPS = np.arange(2.5, SIDE, 5.0)  # a stem every 5 m
@@ -124,12 +126,37 @@ def check_refusals(folder, cloud):
     assert abs(float(corner["seen_share"]) - 0.25) < 0.02 and corner["stems_per_ha"] == ""
 
 
+def check_benchmark_frame(folder):
+    """benchmarks/stand_table.py --plots: a run on the globe has its plots where its layers are."""
+    run, turned = folder / "run", folder / "turned"
+    turned.mkdir()
+    (turned / "trees.gpkg").write_bytes((run / "trees.gpkg").read_bytes())
+    with open(run / "trees.csv", newline="") as file:
+        trees = list(csv.DictReader(file))
+    scale, turn = 0.9997, np.exp(0.4j)
+    world = {t["id"]: (complex(float(t["x"]), float(t["y"])) - EAST - 1j * NORTH) / (scale * turn) for t in trees}
+    for tree in trees:
+        tree["x"], tree["y"] = f"{world[tree['id']].real:.3f}", f"{world[tree['id']].imag:.3f}"
+    with open(turned / "trees.csv", "w", newline="") as file:
+        table = csv.DictWriter(file, trees[0].keys())
+        table.writeheader()
+        table.writerows(trees)
+    for place in (run, turned):
+        at = 15 + 12j if place == turned else 15 + 12j + EAST + 1j * NORTH
+        (place / "trajectory.tum").write_text(f"0 {at.real} {at.imag} 0 0 0 0 1\n")
+        said = subprocess.run([sys.executable, BENCHMARK, "--plots", str(place)], capture_output=True, text=True, check=True)
+        row = said.stdout.splitlines()[1].split(",")
+        wanted = EAST + 1j * NORTH + ((15 + 12j) * scale * turn if place == turned else 15 + 12j)
+        assert abs(complex(float(row[1]), float(row[2])) - wanted) < 0.01, (row, wanted)
+
+
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         cloud = folder / "stand.las"
         make_cloud(cloud)
         check_figures(folder, cloud)
+        check_benchmark_frame(folder)
         check_refusals(folder, cloud)
 
 

@@ -221,11 +221,14 @@ inline constexpr double kStraight = 6.0;
 }  // namespace tree_heights
 
 namespace top_judgement {  // forest/top_judgement.cc
-// Points in the half metre below the top of a tree whose top was seen, at least [bound: what a top
-// is called seen by]
+// Points in the half metre below the top of a tree whose top was well seen, at least [bound: what a
+// top is called seen by]
 inline constexpr int kTopPoints = 5;
-// m: standard deviation of a height whose top and foot were seen [chosen]
+// m: standard deviation of a height whose top and foot were well seen [chosen]
 inline constexpr double kHeightSd = 0.6;
+// m: the same where the top was poorly seen [tuned on random seeds 3, 4, 5, 9, 16, handheld 3 and
+// lake 3: 0.6 to 1.2 were tried]
+inline constexpr double kPoorSd = 1.0;
 // m: the same where the height is a lower bound [chosen]
 inline constexpr double kBoundSd = 2.0;
 // m above a top that have to be seen empty for the height to count [chosen]
@@ -234,8 +237,20 @@ inline constexpr double kMargin = 1.0;
 // [chosen: the middle of a metre, and the margin]
 inline constexpr double kBeside = 1.0;
 // Points that the metre above a top would show, did the tree go on: with fewer its height is a
-// lower bound [tuned on random seeds 8, 9, 16 and handheld seeds 3, 4: 5 to 20 were tried]
-inline constexpr double kLeastExpected = 12.0;
+// lower bound [tuned on random seeds 3, 4, 5, 9, 16: 0 to 12 were tried; by chance two show none in
+// one case of seven]
+inline constexpr double kLeastExpected = 2.0;
+// The same for a top that was well seen [tuned on random seeds 8, 9, 16 and handheld seeds 3, 4, as
+// the limit of a lower bound, which it was: 5 to 20 were tried]
+inline constexpr double kWellExpected = 12.0;
+// Points within four metres above a top, at least, with which the tree goes on [tuned on the same
+// seeds: 2 to 8 were tried]
+inline constexpr int kLeastBeyond = 2;
+// Of the points of the metre below the top, the same [tuned on the same seeds: 0 to 0.25 were
+// tried]
+inline constexpr double kBeyondShare = 0.1;
+// Times the points from eight to sixteen metres above: ghosts thin out with height [chosen]
+inline constexpr double kGhosts = 4.0;
 // m above the ground, of a scanner beside the terrain model [chosen: a person's]
 inline constexpr double kScannerHeight = 1.5;
 // Places of the scanner that a top is looked at from, about [bound: time]

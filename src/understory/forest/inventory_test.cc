@@ -317,14 +317,14 @@ TEST(Inventory, ATopBehindACrownIsALowerBound) {
   plot.add_stem({14.0, 10.0, 0.3});
   Random random(30);
   for (int i = 0; i < 4000; ++i)
-    plot.cloud.emplace_back(random.uniform(6.0, 16.0), random.uniform(8.0, 12.0),
+    plot.cloud.emplace_back(random.uniform(6.0, 18.0), random.uniform(8.0, 12.0),
                             plot.ground(10.0, 10.0) + random.uniform(14.5, 22.0));
   const auto bound_from = [&](double height_m) {
     const Lookouts lookouts = [&](const Eigen::Vector3d& place) {
       // The view ends above the first top where nothing is in the way.
       const bool low = place.z() < plot.ground(4.0, 10.0) + 15.0;
-      std::vector<Eigen::Vector3d> from = {{19.0, 10.0, 100.0 + height_m}};
-      if (low) from.push_back({-61.0, 10.0, 101.0});
+      std::vector<Eigen::Vector3d> from = {{21.0, 10.0, 100.0 + height_m}};
+      if (low) from.push_back({-16.0, 10.0, 101.0});
       return from;
     };
     const InventoryResult result =

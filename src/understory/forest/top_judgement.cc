@@ -46,21 +46,35 @@ double view_at(const SightLines& sight, const InventoryResult& result, const Ste
          chosen;
 }
 
-// Which trees would show too few points above their top.
-std::vector<char> out_of_sight(const StemTops& tops, const Lookouts& lookouts,
+// Whether points above a top hang together with it. Ghosts are there as well farther up.
+bool goes_on(const StemTops& tops, std::size_t stem) {
+  const double beyond = tops.beyond_points[stem];
+  return beyond >= kLeastBeyond && beyond >= kBeyondShare * tops.top_metre_points[stem] &&
+         beyond > kGhosts * tops.sky_points[stem];
+}
+
+// How well the top of a tree was seen.
+enum class TopView : char { kWell, kPoorly, kNot };
+
+// Tops are not seen where trees go on above them, or would show too few points there.
+std::vector<TopView> top_views(const StemTops& tops, const Lookouts& lookouts,
                                const InventoryResult& result) {
   const SightLines sight(tops.space);
-  std::vector<char> hidden(result.stems.size(), 0);
-  parallel_for(hidden.size(), 16, [&](std::size_t i) {
+  std::vector<TopView> views(result.stems.size(), TopView::kWell);
+  parallel_for(views.size(), 16, [&](std::size_t i) {
     const double height = result.trees[i].height_m;
     if (!std::isfinite(height)) return;
     const StemFit& stem = result.stems[i];
     const double below = view_at(sight, result, stem, height - kBeside, lookouts);
     const double above = view_at(sight, result, stem, height + kBeside, lookouts);
     const double expected = below > 0.0 ? tops.top_metre_points[i] * above / below : 0.0;
-    hidden[i] = expected < kLeastExpected ? 1 : 0;
+    if (expected < kLeastExpected || goes_on(tops, i)) {
+      views[i] = TopView::kNot;
+    } else if (expected < kWellExpected || tops.top_points[i] < kTopPoints) {
+      views[i] = TopView::kPoorly;
+    }
   });
-  return hidden;
+  return views;
 }
 
 // Distance from the path, or what grows with it.
@@ -75,14 +89,36 @@ double farness_of(const InventoryResult& result, std::size_t tree,
   return std::sqrt(least);
 }
 
-std::vector<char> cut_by_view(const StemTops& tops, const std::vector<Eigen::Vector3d>& scanner,
-                              const InventoryResult& result) {
+double sd_of(TopView view) {
+  switch (view) {
+    case TopView::kWell:
+      return kHeightSd;
+    case TopView::kPoorly:
+      return kPoorSd;
+    case TopView::kNot:
+      break;
+  }
+  return kBoundSd;
+}
+
+// The same where the view is not known. Tops are not seen where they show too few points, or end
+// with what was seen of others.
+std::vector<TopView> likely_top_views(const StemTops& tops,
+                                      const std::vector<Eigen::Vector3d>& scanner,
+                                      const InventoryResult& result) {
   std::vector<TreeInView> trees;
   for (std::size_t i = 0; i < result.stems.size(); ++i) {
     // Of trees without a height, too: their tops tell where the view ends.
     trees.push_back({tops.top_m[i], result.trees[i].dbh_m, farness_of(result, i, scanner)});
   }
-  return ends_with_the_view(trees);
+  std::vector<char> ends(result.stems.size(), 0);
+  if (!result.from_above) ends = ends_with_the_view(trees);
+  std::vector<TopView> views;
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    const bool seen = tops.top_points[i] >= kTopPoints && ends[i] == 0;
+    views.push_back(seen ? TopView::kWell : TopView::kNot);
+  }
+  return views;
 }
 
 }  // namespace
@@ -96,17 +132,13 @@ double listed_height(const InventoryResult& result, const StemFit& stem, double 
 
 void judge_tops(const StemTops& tops, const Lookouts& lookouts,
                 const std::vector<Eigen::Vector3d>& scanner, InventoryResult& result) {
-  std::vector<char> hidden(result.stems.size(), 0);
-  std::vector<char> cut = hidden;
-  if (lookouts) hidden = out_of_sight(tops, lookouts, result);
-  if (!result.from_above) cut = cut_by_view(tops, scanner, result);
+  const std::vector<TopView> views =
+      lookouts ? top_views(tops, lookouts, result) : likely_top_views(tops, scanner, result);
   for (std::size_t i = 0; i < result.stems.size(); ++i) {
     Tree& tree = result.trees[i];
     if (std::isnan(tree.height_m)) continue;
-    const bool seen = tops.top_points[i] >= kTopPoints && hidden[i] == 0 && cut[i] == 0;
-    tree.height_is_lower_bound = seen ? 0.0 : 1.0;
-    tree.height_sd_m =
-        std::hypot(seen ? kHeightSd : kBoundSd, result.ground.unseen.sd_m(tree.x, tree.y));
+    tree.height_is_lower_bound = views[i] == TopView::kNot ? 1.0 : 0.0;
+    tree.height_sd_m = std::hypot(sd_of(views[i]), result.ground.unseen.sd_m(tree.x, tree.y));
   }
 }
 

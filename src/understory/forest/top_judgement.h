@@ -19,10 +19,15 @@ using Lookouts = std::function<std::vector<Eigen::Vector3d>(const Eigen::Vector3
                                    const Lookouts& lookouts);
 
 // Says how sure the heights of `result.trees` are, and which are lower bounds:
+// Where the view is known (`lookouts`):
+// - if the metre above the top would show fewer than two points, did the tree go on as in the metre
+//   below. That is their number times the ratio of how well both are seen;
+// - if points go on above the top: two or more within four metres, and a tenth of those of the
+// metre
+//   below, unless ghosts of other pulses fill the sky as well.
+// Of the others some are less sure: that metre would show fewer than twelve, or the half metre
+// below the top has fewer than five. Where it is not known:
 // - of fewer than five points in the half metre below the top;
-// - where the view is known (`lookouts`): if the metre above the top would show fewer than twelve
-//   points, did the tree go on as in the metre below. That is their number times the ratio of how
-//   well both are seen;
 // - where tops end with the view (trees/view_limit.h), by their distance from `scanner`, or
 //   without that by the number of returns over the diameter.
 // Where the ground at the foot was not seen, a height is less sure (GroundModel::unseen).

@@ -7,7 +7,11 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <numbers>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "understory/simulation/sensors/satellite.h"
 #include "understory/util/error.h"
@@ -190,6 +194,38 @@ TEST(Simulator, AFileOfAnotherProgramInPlaceOfTheCacheStays) {
     EXPECT_EQ(std::string(std::istreambuf_iterator<char>(kept), {}), text);
   }
   EXPECT_TRUE(log.warnings().empty());
+}
+
+// Defect: the truth gave broken trees the height that they had before.
+TEST(Simulator, TrueHeightsAreThoseOfWhatStands) {
+  Simulator simulator(
+      load_site("demo", {"duration_s=0.2", "lidar.columns=64", "stand.broken_share=0.5"}));
+  (void)read_all(simulator);
+  const test::TemporaryFolder own;
+  const std::string folder = own / "run.truth";
+  simulator.write_truth(folder);
+  std::map<std::string, double> ends;
+  std::ifstream curves(folder + "/stem_curves.csv");
+  std::string line;
+  std::getline(curves, line);
+  while (std::getline(curves, line)) {
+    const std::size_t comma = line.find(',');
+    ends[line.substr(0, comma)] = std::stod(line.substr(comma + 1));
+  }
+  std::ifstream trees(folder + "/trees.csv");
+  std::getline(trees, line);
+  int low = 0;
+  while (std::getline(trees, line)) {
+    std::stringstream row(line);
+    std::vector<std::string> cells;
+    for (std::string cell; std::getline(row, cell, ',');)
+      cells.push_back(cell);
+    const double height = std::stod(cells.at(6));  // height_m
+    EXPECT_NEAR(height, ends.at(cells[0]), 0.1 + 1e-6) << line;
+    low += height < 6.0 ? 1 : 0;
+  }
+  EXPECT_GT(ends.size(), 100U);
+  EXPECT_GT(low, 5);
 }
 
 TEST(Simulator, WritesItsTruth) {

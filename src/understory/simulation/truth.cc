@@ -134,7 +134,7 @@ Tree truth_of(const GrownTree& grown, const TrueCrown& crown) {
   tree.z = grown.foot.z();
   tree.dbh_m = grown.dbh_m;
   tree.species = species_name(grown.species);
-  tree.height_m = grown.height_m;
+  tree.height_m = stem_end_m(grown);
   tree.lean_deg = grown.lean_deg();
   tree.dbh_sd_m = tree.x_sd_m = tree.y_sd_m = 0.0;
   if (has_known_stem(grown)) {

@@ -30,6 +30,10 @@ struct HeldBack {
 
 // Decimetres.
 constexpr int kHalfMetre = 5;
+constexpr int kBeyond = 40;
+constexpr int kSky = 80;
+// m above a top.
+constexpr double kSkyFrom = 8.0;
 
 // Height of the ground at each stem over the origin.
 std::vector<double> ground_at_stems(const CrownTask& task, const std::vector<StemFit>& stems) {
@@ -117,6 +121,8 @@ class TileAbove {
       if (!std::isfinite(height)) continue;
       result.top_points[stem] = columns_.points_below(i, height, kHalfMetre);
       result.top_metre_points[stem] = columns_.points_below(i, height, 2 * kHalfMetre);
+      result.beyond_points[stem] = columns_.points_above(i, height, kBeyond);
+      result.sky_points[stem] = columns_.points_above(i, height + kSkyFrom, kSky);
     }
     if (!task_.full) return;
     std::vector<std::vector<SlicePoint>> points = surroundings_->take();
@@ -182,6 +188,8 @@ class TileAbove {
 StemTops look_up(const CrownTask& task, double canopy_cell_m, const ListedHeight& listed) {
   const std::size_t tiles = task.cloud.tiles().size();
   StemTops result{std::vector<double>(task.stems.size()),
+                  std::vector<int>(task.stems.size(), 0),
+                  std::vector<int>(task.stems.size(), 0),
                   std::vector<int>(task.stems.size(), 0),
                   std::vector<int>(task.stems.size(), 0),
                   {},

@@ -40,6 +40,8 @@ struct StemTops {
   std::vector<double> top_m;          // of each stem; NaN where it is not known
   std::vector<int> top_points;        // of each stem: points in the half metre below its height
   std::vector<int> top_metre_points;  // of each stem: in the metre below it
+  std::vector<int> beyond_points;     // of each stem: in the four metres above it
+  std::vector<int> sky_points;        // of each stem: from eight to sixteen metres above it
   std::vector<StemCurve> curves;      // of each stem, in a full inventory
   StemSheets sheets;                  // of each stem that is most in doubt
   CanopyGrid canopy;

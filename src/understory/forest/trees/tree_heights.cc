@@ -22,6 +22,11 @@ std::uint64_t key(const Eigen::Vector2i& cell) {
          static_cast<std::uint32_t>(cell.y());
 }
 
+// The last one: and above.
+int decimetre_of(double height_m) {
+  return static_cast<int>(std::min(10.0 * HeightColumn::kMetres - 1.0, 10.0 * height_m));
+}
+
 }  // namespace
 
 Eigen::Vector2d stem_place_at(const StemFit& stem, double height_m) {
@@ -61,8 +66,7 @@ std::size_t TreeColumns::add(const Eigen::Vector3d& point, double height_m) {
   const std::size_t metre = HeightColumn::metre_of(over_foot);
   ++column.points[metre];
   column.highest_m[metre] = std::max(column.highest_m[metre], static_cast<float>(over_foot));
-  std::uint8_t& count = column.decimetres[std::min(column.decimetres.size() - 1,
-                                                   static_cast<std::size_t>(10.0 * over_foot))];
+  std::uint8_t& count = column.decimetres[static_cast<std::size_t>(decimetre_of(over_foot))];
   if (count < 255) ++count;
   return nearest;
 }
@@ -78,11 +82,19 @@ double TreeColumns::top(std::size_t stem, double slices_end_m) const {
 }
 
 int TreeColumns::points_below(std::size_t stem, double height_m, int decimetres) const {
+  const int end = decimetre_of(height_m) + 1;
+  return points_within(stem, end - decimetres, end);
+}
+
+int TreeColumns::points_above(std::size_t stem, double height_m, int decimetres) const {
+  const int begin = decimetre_of(height_m) + 1;
+  return points_within(stem, begin, begin + decimetres);
+}
+
+int TreeColumns::points_within(std::size_t stem, int begin, int end) const {
   const auto& counts = columns_[stem].decimetres;
-  const auto end =
-      static_cast<int>(std::min(counts.size() - 1, static_cast<std::size_t>(10.0 * height_m))) + 1;
   int points = 0;
-  for (int d = std::max(0, end - decimetres); d < end; ++d)
+  for (int d = std::max(0, begin); d < std::min(end, static_cast<int>(counts.size())); ++d)
     points += counts[static_cast<std::size_t>(d)];
   return points;
 }

@@ -33,12 +33,17 @@ class TreeColumns {
   [[nodiscard]] double ground_m(std::size_t stem) const { return ground_m_[stem]; }
   // Points in so many decimetres below a height; of each decimetre 255 stand for more.
   [[nodiscard]] int points_below(std::size_t stem, double height_m, int decimetres) const;
+  // Points in so many decimetres above the one that holds a height, likewise.
+  [[nodiscard]] int points_above(std::size_t stem, double height_m, int decimetres) const;
 
  private:
   struct Column : HeightColumn {
     std::array<float, kMetres> highest_m{};               // within each metre
     std::array<std::uint8_t, 10 * kMetres> decimetres{};  // points of each
   };
+  // Points of the decimetres [begin, end).
+  [[nodiscard]] int points_within(std::size_t stem, int begin, int end) const;
+
   const std::vector<StemFit>& stems_;
   std::vector<double> ground_m_;
   // Stems by the squares that they or their reach come to at any height.

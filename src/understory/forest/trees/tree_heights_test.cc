@@ -5,6 +5,9 @@
 #include <cmath>
 #include <vector>
 
+#include "understory/forest/inventory.h"
+#include "understory/forest/test_plot.h"
+
 namespace understory {
 namespace {
 
@@ -83,6 +86,46 @@ TEST(TreeHeights, PointsBelowATopAreCountedToHalfAMetre) {
   for (int i = 0; i < 1000; ++i)
     columns.add({0.0, 0.0, 10.0}, 10.0);
   EXPECT_EQ(columns.points_below(0, 10.04, 1), 255);
+}
+
+TEST(TreeHeights, PointsAboveATopAreCounted) {
+  const std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0)};
+  TreeColumns columns(stems, {0.0});
+  for (const double height : {9.95, 10.04, 10.12, 13.9, 14.05, 14.15, 70.0, 80.0})
+    columns.add({0.0, 0.0, height}, height);
+  EXPECT_EQ(columns.points_above(0, 10.04, 40), 3);  // not its own decimetre, and up to 14.1 m
+  EXPECT_EQ(columns.points_above(0, 10.04, 39), 2);
+  EXPECT_EQ(columns.points_above(0, 62.0, 80), 2);  // all above the last metre
+  EXPECT_EQ(columns.points_above(0, 90.0, 80), 0);
+}
+
+// Defect: a crown that thins out upwards, as ever fewer beams reach it, was cut where ghosts would
+// begin, and called seen to its top. Ghosts fill the sky far above as well.
+TEST(TreeHeights, ATreeThatGoesOnInAFewPointsIsALowerBound) {
+  const auto bound_with = [](const std::vector<double>& beyond, int ghosts) {
+    TestPlot plot(29);
+    plot.add_ground(20.0, 40);
+    plot.add_stem({4.0, 10.0, 0.3});
+    const double ground = plot.ground(4.0, 10.0);
+    for (const double height : beyond)
+      plot.cloud.emplace_back(4.0, 10.0, ground + height);
+    for (int i = 0; i < ghosts; ++i)
+      plot.cloud.emplace_back(4.2, 10.0, ground + 23.5 + 7.0 * i / ghosts);
+    const Lookouts lookouts = [](const Eigen::Vector3d&) {
+      return std::vector<Eigen::Vector3d>{{15.0, 10.0, 101.0}};
+    };
+    const InventoryResult result =
+        take_inventory(blocks_of(plot.cloud), basic_inventory(), {}, lookouts);
+    const Tree* tree = nearest(result.trees, 4.0, 10.0);
+    if (tree == nullptr) return -1.0;
+    EXPECT_NEAR(tree->height_m, 15.0, 0.3);
+    return tree->height_is_lower_bound;
+  };
+  const std::vector<double> thinning = {15.3, 15.5, 15.7, 15.9, 16.3, 16.6, 16.9, 17.3, 17.7, 18.5};
+  EXPECT_EQ(bound_with({}, 0), 0.0);
+  EXPECT_EQ(bound_with({16.6}, 0), 0.0);  // a stray
+  EXPECT_EQ(bound_with(thinning, 0), 1.0);
+  EXPECT_EQ(bound_with(thinning, 20), 0.0);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "understory/evaluation/trajectory.h"
+#include "understory/map/carrier_region.h"
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/pipeline/run_folder/run_json.h"
 
@@ -31,17 +32,16 @@ std::array<double, LidarView::kSectors> LidarView::no_returns() {
   return none;
 }
 
-void LidarView::add(const std::vector<KeyframePoint>& points) {
+void LidarView::add(const std::vector<Eigen::Vector3d>& places) {
   const Pose lidar_from_body = body_from_lidar.inverse();
   // Points that are surely lower than another of their sector are left out by their slope. Most are
   // lower than what every sector has, so their sector is not looked up.
   std::array<double, kSectors> steepest{};
   steepest.fill(-std::numeric_limits<double>::infinity());
   double everywhere = -std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < points.size(); ++i) {
+  for (std::size_t i = 0; i < places.size(); ++i) {
     if (i % kPointsPerLook == 0) everywhere = *std::min_element(steepest.begin(), steepest.end());
-    const KeyframePoint& p = points[i];
-    const Eigen::Vector3d point = lidar_from_body * Eigen::Vector3f(p.x, p.y, p.z).cast<double>();
+    const Eigen::Vector3d point = lidar_from_body * places[i];
     const double flat = point.head<2>().norm();
     if (point.z() < (everywhere - kSureSlope) * flat) continue;
     const std::size_t sector = sector_of(point);
@@ -55,12 +55,25 @@ bool LidarView::covers(const Eigen::Vector3d& point_in_lidar) const {
   return elevation_deg(point_in_lidar) <= highest_deg[sector_of(point_in_lidar)];  // not for NaN
 }
 
-LidarView learn_view(const KeyframeClouds& clouds, const Pose& body_from_lidar) {
+LidarView learn_view(const KeyframeClouds& clouds, const Pose& body_from_lidar,
+                     std::span<const StampedPose> path) {
   LidarView view;
   view.body_from_lidar = body_from_lidar;
   const std::size_t count = std::min(kClouds, clouds.size());
-  for (std::size_t i = 0; i < count; ++i)
-    view.add(clouds.read(i * clouds.size() / count).points);
+  std::vector<Eigen::Vector3d> places;
+  for (std::size_t i = 0; i < count; ++i) {
+    const KeyframeCloud cloud = clouds.read(i * clouds.size() / count);
+    places.clear();
+    if (path.empty()) {
+      for (const KeyframePoint& p : cloud.points)
+        places.push_back(Eigen::Vector3f(p.x, p.y, p.z).cast<double>());
+    } else {
+      const PlacesAsMeasured as_measured(cloud, path);
+      for (const KeyframePoint& p : cloud.points)
+        places.push_back(as_measured(p));
+    }
+    view.add(places);
+  }
   return view;
 }
 

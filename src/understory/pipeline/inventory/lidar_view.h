@@ -3,11 +3,13 @@
 #include <Eigen/Core>
 #include <array>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "understory/forest/inventory.h"
 #include "understory/geometry/pose.h"
+#include "understory/geometry/stamped_pose.h"
 #include "understory/map/keyframes/keyframe_clouds.h"
 #include "understory/output/run_summary.h"
 #include "understory/sensor/rig.h"
@@ -22,8 +24,9 @@ struct LidarView {
   // Elevation of the highest return by azimuth, lidar frame, degrees; NaN where there is none.
   std::array<double, kSectors> highest_deg = no_returns();
 
-  // Points in the body frame.
-  void add(const std::vector<KeyframePoint>& points);
+  // Places in the body frame as the body stood when each was measured. A place that was moved to
+  // the stamp of its scan has another elevation: the body tilts during a scan.
+  void add(const std::vector<Eigen::Vector3d>& places);
   // Whether a point in the lidar's frame is in view, or below it.
   [[nodiscard]] bool covers(const Eigen::Vector3d& point_in_lidar) const;
 
@@ -31,8 +34,10 @@ struct LidarView {
   [[nodiscard]] static std::array<double, kSectors> no_returns();
 };
 
-// From some of the clouds, evenly chosen.
-[[nodiscard]] LidarView learn_view(const KeyframeClouds& clouds, const Pose& body_from_lidar);
+// From some of the clouds, evenly chosen. `path`: of the body, in order of time; with it the motion
+// during each scan is undone. Empty: the clouds are taken as they are.
+[[nodiscard]] LidarView learn_view(const KeyframeClouds& clouds, const Pose& body_from_lidar,
+                                   std::span<const StampedPose> path);
 
 // Where the lidar was, of the poses, when a place within 60 m was in its view (world frame, about
 // one place a metre). Occlusion is not looked at.

@@ -56,7 +56,8 @@ class DenseMap : public MapMaker {
   void list_trees() override {
     if (!made_.tiles) return;
     const ScopedTimer timer(front_end_.times(), "finish_inventory");
-    const LidarView view = learn_view(front_end_.clouds(), front_end_.rig().body_from_lidar);
+    const LidarView view = learn_view(front_end_.clouds(), front_end_.rig().body_from_lidar,
+                                      made_.trajectory.trajectory);
     const std::vector<Pose> poses = poses_of(front_end_.map().keyframes());
     made_.forest = std::make_unique<TiledMap>(*made_.tiles, front_end_.config().inventory_bytes,
                                               recording_.work);
