@@ -1,5 +1,6 @@
 """What is no recording, and words that no command knows: refused at once, and nothing is written."""
 
+import json
 import pathlib
 import shutil
 
@@ -63,6 +64,31 @@ def one_pose(folder):
         done = program("map", short, "-o", run, "--front-end", front_end)
         poses = len((run / "trajectory.tum").read_text().splitlines())
         assert poses == 1 and done.returncode == 4 and "single pose" in done.stderr, (poses, done)
+
+
+# A plot in map coordinates was told that it has no IMU and loses precision.
+@cases.case("what a single cloud is told")
+def cloud_as_recording(folder):
+    cloud = sorted(CLOUDS.glob("*.pcd"))[0]
+    done = program("info", cloud)
+    assert done.returncode == 0 and f"understory inventory {cloud} -o DIR" in done.stdout, done
+    assert "imu" not in done.stdout and "warnings  none" in done.stdout, done.stdout
+    assert json.loads(program("info", cloud, "--json").stdout)["one_cloud"] is True
+    assert json.loads(program("info", CLOUDS, "--json").stdout)["one_cloud"] is False
+    return done.stdout.replace(str(CLOUDS), "")
+
+
+@cases.case("stems are no recording, a run is no cloud")
+def stems_as_recording(folder):
+    stems = folder / "walk.stems.csv.gz"
+    assert program("convert", walk, stems).returncode == 0
+    for arguments in (("info", stems), ("convert", stems, folder / "a.mcap"), ("map", stems, "-o", folder / "a")):
+        assert f"understory correct {stems} -o DIR" in refused(3, *arguments), arguments
+    said = refused(3, "register", RUN, RUN)
+    assert f"for instance {RUN / 'map.laz'}" in said, said
+    assert "expected one cloud" in refused(3, "register", CLOUDS, RUN / "map.laz")
+    assert sorted(path.name for path in folder.iterdir()) == [stems.name]
+    return said.replace(str(RUN), "RUN")
 
 
 # They came without the word by which a script knows an error.
