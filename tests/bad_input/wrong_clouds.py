@@ -189,6 +189,19 @@ def merged(folder, a, b):
     return program("merge", a, b, "-o", folder / "merged", "--overwrite")
 
 
+@cases.case("lists in two frames")
+def two_frames(folder):
+    first, second = two_lists()
+    a = write_list(folder / "a.csv", first)
+    b = write_list(folder / "b.csv", [(x + 7.3, y - 4.1, *rest) for x, y, *rest in second])
+    done = program("evaluate", "trees", a, b)
+    assert done.returncode == 0 and "few match           --align yaw" in done.stdout, done
+    assert "few match" not in program("evaluate", "trees", a, b, "--align", "yaw").stdout
+    assert "few match" not in program("evaluate", "trees", a, a).stdout
+    other = write_list(folder / "c.csv", two_lists(99)[0])
+    return program("evaluate", "trees", a, other, "--align", "yaw").stdout.splitlines()[2]
+
+
 @cases.case("diameters in another unit")
 def units(folder):
     first, second = two_lists()

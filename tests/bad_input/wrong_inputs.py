@@ -3,8 +3,9 @@
 import json
 import pathlib
 import shutil
+import subprocess
 
-from program import Cases, program
+from program import PROGRAM, Cases, program
 
 cases = Cases()
 walk = cases.folder / "walk.mcap"
@@ -89,6 +90,19 @@ def stems_as_recording(folder):
     assert "expected one cloud" in refused(3, "register", CLOUDS, RUN / "map.laz")
     assert sorted(path.name for path in folder.iterdir()) == [stems.name]
     return said.replace(str(RUN), "RUN")
+
+
+# Figures for `> FILE` were lost with exit code 0.
+@cases.case("a full disk behind what is printed")
+def full_output(_):
+    cloud = sorted(CLOUDS.glob("*.pcd"))[0]
+    for words in (("info", walk, "--json"), ("evaluate", RUN, f"{str(walk)[:-5]}.truth"), ("register", cloud, cloud), ("--help",)):
+        with open("/dev/full", "w") as full:
+            done = subprocess.run([PROGRAM, "--quiet", *map(str, words)], stdout=full, stderr=subprocess.PIPE, text=True)
+        assert done.returncode == 3 and "what is printed cannot be written: No space" in done.stderr, (words, done)
+    closed = subprocess.run(f'"{PROGRAM}" info "{walk}" >&-', shell=True, stderr=subprocess.PIPE, text=True)
+    assert closed.returncode == 0, closed
+    return done.stderr.strip()
 
 
 # They came without the word by which a script knows an error.
