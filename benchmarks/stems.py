@@ -149,9 +149,12 @@ def compared(seeds, length_m, title, choices):
 
 
 def order_page(seeds, length_m):
-    """P0 table 1 over made-up roads: the paper's odometry and powers, its pairs in each order."""
-    return compared(seeds, length_m, "order",
-                    {order: ("powers", "frame", f"correction.order={order}") for order in ORDERS})
+    """P0 table 1 over made-up roads: the paper's odometry and powers, its pairs in each order. Stars
+    have pairs of their own: those that the association of Delaunay stars (P0 section 3) draws, as it
+    draws them."""
+    choices = {order: ("powers", "frame", f"correction.order={order}") for order in ORDERS}
+    choices["stars"] = ("powers", "frame", "correction.pairs.rule=delaunay_stars")
+    return compared(seeds, length_m, "order", choices)
 
 
 def rule_page(seeds, length_m):

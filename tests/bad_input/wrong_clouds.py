@@ -68,6 +68,49 @@ def good_plot(folder):
     return f"{len(listed(folder))} trees in the meadow"
 
 
+# The matrix alone says kilometres where the cloud moved by decimetres.
+@cases.case("two clouds in map coordinates, one of them tilted")
+def map_coordinates(folder):
+    points, clouds = plot(), []
+    tilt = math.radians(1.0)
+    for name, tilted in (("a.xyz.ply", False), ("b.xyz.ply", True)):
+        head = (f"ply\nformat ascii 1.0\nelement vertex {len(points)}\nproperty double x\nproperty double y\n"
+                "property double z\nend_header\n")
+        rows = []
+        for x, y, z in points:
+            dx = x - SIDE / 2
+            if tilted:  # about the plot's middle, and moved by 0.3 m to the west
+                dx, z = dx * math.cos(tilt) + z * math.sin(tilt) - 0.3, z * math.cos(tilt) - dx * math.sin(tilt)
+            rows.append(f"{470000 + dx:.4f} {3810000 + y:.4f} {2300 + z:.4f}")
+        (folder / name).write_text(head + "\n".join(rows) + "\n")
+        clouds.append(folder / name)
+    done = program("register", *clouds, "--json")
+    assert done.returncode == 0, done
+    found = json.loads(done.stdout)
+    assert abs(found["turn_deg"] - 1.0) < 0.1, found
+    assert math.dist(found["middle_of_b"][:2], (470000, 3810010)) < 1.0, found
+    matrix, place = found["a_from_b"], [*found["middle_of_b"], 1.0]
+    moved = [sum(matrix[4 * r + c] * place[c] for c in range(4)) - place[r] for r in range(3)]
+    assert math.dist(moved, found["shift_there_m"]) < 1e-6, (moved, found)
+    assert math.hypot(*found["shift_there_m"]) < 1.0 < 1000.0 < math.hypot(matrix[3], matrix[7], matrix[11]), found
+    text = program("register", *clouds).stdout
+    assert f"turn_deg {found['turn_deg']:.3f}" in text and "shift_there_m " in text, text
+    return f"{found['shift_there_m']} at the plot, {matrix[11]:.0f} m in the matrix"
+
+
+# A tree of its own had 2,462 stems per hectare "on 0.000 ha", with no word of doubt.
+@cases.case("a single tree")
+def single_tree(folder):
+    x, y = SIDE / 2, SIDE / 2
+    points = [p for p in plot() if p[2] < 0.1 and math.dist(p[:2], (x, y)) < 1.5]
+    points += tree_points(x, y, 14.0, random.Random(1), 9000)
+    done = inventory(write_ply(folder / "tree.ply", points), folder)
+    assert done.returncode == 0 and done.stdout.startswith("1 tree; 1 of them on "), done
+    told = [warning["message"] for warning in json.loads((folder / "inventory" / "run.json").read_text())["warnings"]]
+    assert " m2 seen" in done.stdout and any("say little of a stand" in each for each in told), (done, told)
+    return done.stdout.strip()
+
+
 # Its list of no tree was complete: what the user says of the frame is not checked, but what comes of it is.
 @cases.case("a plot that the user turns upside down")
 def upside_down(folder):
@@ -144,6 +187,19 @@ def two_lists(seed=7):
 
 def merged(folder, a, b):
     return program("merge", a, b, "-o", folder / "merged", "--overwrite")
+
+
+@cases.case("lists in two frames")
+def two_frames(folder):
+    first, second = two_lists()
+    a = write_list(folder / "a.csv", first)
+    b = write_list(folder / "b.csv", [(x + 7.3, y - 4.1, *rest) for x, y, *rest in second])
+    done = program("evaluate", "trees", a, b)
+    assert done.returncode == 0 and "few match           --align yaw" in done.stdout, done
+    assert "few match" not in program("evaluate", "trees", a, b, "--align", "yaw").stdout
+    assert "few match" not in program("evaluate", "trees", a, a).stdout
+    other = write_list(folder / "c.csv", two_lists(99)[0])
+    return program("evaluate", "trees", a, other, "--align", "yaw").stdout.splitlines()[2]
 
 
 @cases.case("diameters in another unit")

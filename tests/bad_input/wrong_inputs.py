@@ -1,9 +1,11 @@
 """What is no recording, and words that no command knows: refused at once, and nothing is written."""
 
+import json
 import pathlib
 import shutil
+import subprocess
 
-from program import Cases, program
+from program import PROGRAM, Cases, program
 
 cases = Cases()
 walk = cases.folder / "walk.mcap"
@@ -63,6 +65,44 @@ def one_pose(folder):
         done = program("map", short, "-o", run, "--front-end", front_end)
         poses = len((run / "trajectory.tum").read_text().splitlines())
         assert poses == 1 and done.returncode == 4 and "single pose" in done.stderr, (poses, done)
+
+
+# A plot in map coordinates was told that it has no IMU and loses precision.
+@cases.case("what a single cloud is told")
+def cloud_as_recording(folder):
+    cloud = sorted(CLOUDS.glob("*.pcd"))[0]
+    done = program("info", cloud)
+    assert done.returncode == 0 and f"understory inventory {cloud} -o DIR" in done.stdout, done
+    assert "imu" not in done.stdout and "warnings  none" in done.stdout, done.stdout
+    assert json.loads(program("info", cloud, "--json").stdout)["one_cloud"] is True
+    assert json.loads(program("info", CLOUDS, "--json").stdout)["one_cloud"] is False
+    return done.stdout.replace(str(CLOUDS), "")
+
+
+@cases.case("stems are no recording, a run is no cloud")
+def stems_as_recording(folder):
+    stems = folder / "walk.stems.csv.gz"
+    assert program("convert", walk, stems).returncode == 0
+    for arguments in (("info", stems), ("convert", stems, folder / "a.mcap"), ("map", stems, "-o", folder / "a")):
+        assert f"understory correct {stems} -o DIR" in refused(3, *arguments), arguments
+    said = refused(3, "register", RUN, RUN)
+    assert f"for instance {RUN / 'map.laz'}" in said, said
+    assert "expected one cloud" in refused(3, "register", CLOUDS, RUN / "map.laz")
+    assert sorted(path.name for path in folder.iterdir()) == [stems.name]
+    return said.replace(str(RUN), "RUN")
+
+
+# Figures for `> FILE` were lost with exit code 0.
+@cases.case("a full disk behind what is printed")
+def full_output(_):
+    cloud = sorted(CLOUDS.glob("*.pcd"))[0]
+    for words in (("info", walk, "--json"), ("evaluate", RUN, f"{str(walk)[:-5]}.truth"), ("register", cloud, cloud), ("--help",)):
+        with open("/dev/full", "w") as full:
+            done = subprocess.run([PROGRAM, "--quiet", *map(str, words)], stdout=full, stderr=subprocess.PIPE, text=True)
+        assert done.returncode == 3 and "what is printed cannot be written: No space" in done.stderr, (words, done)
+    closed = subprocess.run(f'"{PROGRAM}" info "{walk}" >&-', shell=True, stderr=subprocess.PIPE, text=True)
+    assert closed.returncode == 0, closed
+    return done.stderr.strip()
 
 
 # They came without the word by which a script knows an error.

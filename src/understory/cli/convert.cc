@@ -191,6 +191,7 @@ int run_convert(const ConvertOptions& options, CommandContext& context) {
     return convert_layers(conversion, context);
   }
   refuse_run(options.input);
+  refuse_stems(options.input);
   refuse_input_as_output(options.output, files_of(options.input, options.open));
   if (is_stems_file(options.output))
     return convert_to_stems(options.input, options.output, options.open, options.overwrite,

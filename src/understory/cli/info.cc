@@ -104,15 +104,11 @@ nlohmann::json imu_json(const RecordingInfo::Imu& imu) {
 }
 
 void print_json(const RecordingInfo& info) {
-  nlohmann::json json = {{"path", info.path},
-                         {"format", info.format},
-                         {"complete", info.complete},
-                         {"duration_s", info.duration_s},
-                         {"lidar", lidar_json(info)},
-                         {"imu", imu_json(info.imu)},
-                         {"mag_samples", info.mag_samples},
-                         {"rig", rig_json(info.rig)},
-                         {"warnings", info.warnings}};
+  nlohmann::json json = {
+      {"path", info.path},           {"format", info.format},           {"complete", info.complete},
+      {"one_cloud", info.one_cloud}, {"duration_s", info.duration_s},   {"lidar", lidar_json(info)},
+      {"imu", imu_json(info.imu)},   {"mag_samples", info.mag_samples}, {"rig", rig_json(info.rig)},
+      {"warnings", info.warnings}};
   json["gnss"] = {{"fixes", info.gnss.fixes},
                   {"valid", info.gnss.valid},
                   {"headings", info.gnss.headings},
@@ -183,7 +179,25 @@ void print_pose(const char* name, const std::optional<Pose>& pose, const std::st
               t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), source.c_str());
 }
 
+// Of one cloud nothing is said of rates, gaps and extrinsics: it has none.
+void print_cloud(const RecordingInfo& info) {
+  std::printf("%s\n  %s, %llu points, %.1f to %.1f m from its origin\n", info.path.c_str(),
+              info.format.c_str(), static_cast<unsigned long long>(info.lidar.points),
+              info.lidar.nearest_m, info.lidar.farthest_m);
+  std::printf("\nnext      understory inventory %s -o DIR\n", info.path.c_str());
+}
+
+void print_warnings(const RecordingInfo& info) {
+  std::printf("\nwarnings  %s\n", info.warnings.empty() ? "none" : "");
+  for (const std::string& warning : info.warnings)
+    std::printf("  - %s\n", warning.c_str());
+}
+
 void print_text(const RecordingInfo& info) {
+  if (info.one_cloud) {
+    print_cloud(info);
+    return print_warnings(info);
+  }
   std::printf("%s\n  %s, %.2f s%s\n", info.path.c_str(), info.format.c_str(), info.duration_s,
               info.complete ? "" : " (stopped before the end)");
   print_topics(info);
@@ -205,13 +219,12 @@ void print_text(const RecordingInfo& info) {
   if (info.gnss.headings > 0)
     print_pose("body_from_second_gnss", info.rig.body_from_second_gnss,
                info.rig.second_gnss_extrinsic_source);
-  std::printf("\nwarnings  %s\n", info.warnings.empty() ? "none" : "");
-  for (const std::string& warning : info.warnings)
-    std::printf("  - %s\n", warning.c_str());
+  print_warnings(info);
 }
 
 int run_info(const InfoOptions& options, CommandContext& context) {
   refuse_run(options.recording);
+  refuse_stems(options.recording);
   Log log;  // its warnings are part of the result
   const std::unique_ptr<Recording> recording = open_source(options.recording, options.open, log);
   RecordingSurvey survey;

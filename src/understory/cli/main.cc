@@ -1,10 +1,12 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <new>
 #include <string>
@@ -34,6 +36,16 @@ void keep_freed_memory() {
   mallopt(M_MMAP_THRESHOLD, 32 << 20);
   mallopt(M_TRIM_THRESHOLD, 256 << 20);
   mallopt(M_TOP_PAD, 16 << 20);
+}
+
+// What was printed may wait in memory until now: a full disk behind `> FILE` would lose it in
+// silence. A stdout that the user closed is no error.
+int with_printed(int code) {
+  errno = 0;
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  if (errno == EBADF) return code;
+  return complain(kExitBadInput, std::string("what is printed cannot be written: ") +
+                                     std::strerror(errno == 0 ? EIO : errno));
 }
 
 // The one place where errors become exit codes.
@@ -207,12 +219,12 @@ int run(int argc, char** argv) {
     return complain(kExitUsage, complaint.empty() ? with_help(app, error.what()) : complaint);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) return complain(kExitUsage, with_help(app, error.what()));
-    return app.exit(error);  // --help, --version
+    return with_printed(app.exit(error));  // --help, --version
   }
   Log log(terminal_log(verbose, quiet));
   CommandContext context{log, terminal_progress(quiet), install_stop_handler(), threads,
                          stop_at_once};
-  return run_guarded(chosen, context);
+  return with_printed(run_guarded(chosen, context));
 }
 
 }  // namespace

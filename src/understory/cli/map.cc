@@ -142,6 +142,7 @@ int run_map(const MapOptions& options, CommandContext& context) {
   if (!options.resume.empty())
     return with_advice(options.resume, [&] { return run(reopen_mapping(options.resume)); });
   refuse_cloud(options.recording);
+  refuse_stems(options.recording);
   const std::vector<std::string> settings = settings_of(options);
   ReadConfig<FrontEndConfig> read = read_front_end_config(
       options.front_end, options.profile, options.config_file, settings, context.log);

@@ -131,6 +131,25 @@ void refuse_recording(const std::string& cloud) {
                              cloud + " -o RUN`, then give RUN");
 }
 
+void refuse_stems(const std::string& recording) {
+  std::error_code ignored;
+  if (!ends_with_one_of(recording, {"stems.csv.gz", "stems.csv"}) ||
+      !fs::is_regular_file(recording, ignored))
+    return;
+  throw InputError(recording, "",
+                   "holds the stems of a recording, no scans: `understory correct " + recording +
+                       " -o DIR` maps them");
+}
+
+void refuse_folder(const std::string& cloud) {
+  std::error_code ignored;
+  if (!fs::is_directory(cloud, ignored)) return;
+  const fs::path map = fs::path(cloud) / "map.laz";
+  throw InputError(cloud, "",
+                   "is a folder: expected one cloud" +
+                       (fs::exists(map, ignored) ? ", for instance " + map.string() : ""));
+}
+
 void refuse_unmapped(const std::string& given, const std::string& options) {
   std::error_code ignored;
   if (!names_recording(given) || fs::is_directory(given, ignored)) return;

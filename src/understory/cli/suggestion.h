@@ -15,6 +15,10 @@ namespace understory {
 void refuse_cloud(const std::string& recording);
 // Error if `recording` is the folder of a run, finished or not: its map would be taken for a scan.
 void refuse_run(const std::string& recording);
+// Error if `recording` is a file of stems, by its name: `correct` takes it.
+void refuse_stems(const std::string& recording);
+// Error if `cloud` is a folder, where one file is expected. The map of a run is proposed.
+void refuse_folder(const std::string& cloud);
 // Error if `cloud` is a recording, which has to be mapped first.
 void refuse_recording(const std::string& cloud);
 // The same where a run or one of its files is expected. `options` are those of `map` that make what

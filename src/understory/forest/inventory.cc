@@ -326,7 +326,7 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
                    const ProgressSink& progress, const KnownScanner& scanner,
                    const StemHarvest& gathered, InventoryResult& result) {
   const auto tell = [&](const char* stage, double done) {
-    progress({stage, done, 8.0, "passes", ""});
+    progress({stage, done, 8.0, "steps", ""});
   };
   const bool full = config.extent == InventoryExtent::kFull;
   const SlicesNear slices(result.slices, gathered.thinned, cloud, result.origin);
@@ -380,7 +380,7 @@ InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& c
                                const std::vector<Eigen::Vector3d>& scanner) {
   const PointBlocks unasked = [&](const PointVisitor& visit) { cloud.all(visit); };
   const auto tell = [&](const char* stage, double done) {
-    progress({stage, done, 8.0, "passes", ""});
+    progress({stage, done, 8.0, "steps", ""});
   };
   InventoryResult result;
   tell("ground", 0.0);

@@ -113,6 +113,7 @@ class RecordingSurvey::Impl {
     RecordingInfo info = info_;
     info.path = path;
     info.format = recording.format();
+    info.one_cloud = info.format.starts_with("one cloud");
     info.rig = recording.rig();
     info.topics = recording.topics();
     finish_lidar(info);
@@ -121,11 +122,15 @@ class RecordingSurvey::Impl {
     info.gnss.last = fixes_.last();
     info.gnss.rate_hz = fixes_.rate_hz();
     finish_duration(info);
-    for (const Log::Warning& warning : log.warnings())
+    for (const Log::Warning& warning : log.warnings()) {
+      // A cloud of a plot is expected to lie in map coordinates.
+      if (info.one_cloud && warning.key == "recording.far_cloud") continue;
       info.warnings.push_back(
           warning.first_message +
           (warning.count > 1 ? " (" + std::to_string(warning.count) + " such)" : "") + " [" +
           warning.key + "]");
+    }
+    if (info.one_cloud) return info;
     warn_of_lidar(info);
     warn_of_imu(info);
     warn_of_rest(info);

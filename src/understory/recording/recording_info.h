@@ -69,6 +69,7 @@ struct RecordingInfo {
   std::uint64_t mag_samples = 0;
   std::vector<std::string> warnings;  // what would spoil a run
   bool complete = true;               // false: stopped before the end
+  bool one_cloud = false;             // a single cloud, as of a plot, not the scans of a way
 };
 
 // Gathers the figures of a recording from its events, in one pass and constant memory.

@@ -323,6 +323,14 @@ TEST(Sites, AreFoundByNameAndChangedBySettings) {
   }
 }
 
+// The recording said that the IMU was not turned, and its map was untrusted.
+TEST(Sites, AnImuThatIsTheBodyHasNoMount) {
+  EXPECT_THROW((void)load_site("handheld", {"imu.mount_rpy_deg=[0, 0, 135]"}), ConfigError);
+  EXPECT_THROW((void)load_site("handheld", {"imu.mount_m=[0.1, 0, 0]"}), ConfigError);
+  EXPECT_NO_THROW(
+      (void)load_site("handheld", {"imu.mount_m=[0.1, 0, 0]", "carrier.body=base_link"}));
+}
+
 TEST(Sites, UrisAreTakenApart) {
   const SimulationUri uri = parse_simulation_uri("sim:handheld?seed=3&lidar.rays_per_beam=1");
   EXPECT_EQ(uri.site, "handheld");

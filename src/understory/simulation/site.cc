@@ -201,6 +201,19 @@ void check_triple(const std::string& key, const std::vector<double>& value,
   if (value.size() != 3) problems.push_back(key + ": expected three numbers");
 }
 
+// The recording says that the body is the IMU, so no mount can be told to its reader.
+void check_imu_mount(const SiteConfig& site, std::vector<std::string>& problems) {
+  if (site.carrier.body != "imu") return;
+  for (const std::vector<double>& mount : {site.imu.mount_m, site.imu.mount_rpy_deg}) {
+    if (std::all_of(mount.begin(), mount.end(), [](double value) { return value == 0.0; }))
+      continue;
+    problems.push_back(
+        "imu: mount_m and mount_rpy_deg are 0 where the body is the IMU: set "
+        "carrier.body=base_link");
+    return;
+  }
+}
+
 void check_site(const SiteConfig& site) {
   std::vector<std::string> problems;
   check_triple("lidar.mount_m", site.lidar.mount_m, problems);
@@ -211,6 +224,7 @@ void check_site(const SiteConfig& site) {
   check_triple("second_lidar.mount_rpy_deg", site.second_lidar.mount_rpy_deg, problems);
   check_triple("imu.mount_m", site.imu.mount_m, problems);
   check_triple("imu.mount_rpy_deg", site.imu.mount_rpy_deg, problems);
+  check_imu_mount(site, problems);
   check_triple("gnss.mount_m", site.gnss.mount_m, problems);
   check_triple("gnss.second_antenna_m", site.gnss.second_antenna_m, problems);
   check_triple("total_station.prism_m", site.total_station.prism_m, problems);

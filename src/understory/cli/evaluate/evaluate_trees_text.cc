@@ -153,6 +153,17 @@ nlohmann::ordered_json comparison_json(const TreeComparison& result, const TreeO
   return json;
 }
 
+// What to try where most trees found no partner; empty else.
+std::string few_pairs_text(const TreeErrors& errors, const TreeOptions& options) {
+  constexpr std::size_t kFewestTrees = 5;
+  const std::size_t fewer = std::min(errors.trees_a, errors.trees_b);
+  if (fewer < kFewestTrees || 3 * errors.matched >= fewer) return "";
+  return options.alignment == "none" ? "few match           --align yaw moves A onto B first, "
+                                       "--radius-m pairs trees farther "
+                                       "apart\n"
+                                     : "few match           the lists may show different stands\n";
+}
+
 std::string comparison_text(const TreeComparison& result, const TreeOptions& options) {
   const TreeErrors& e = result.all;
   std::string text = fmt::format(
@@ -161,7 +172,7 @@ std::string comparison_text(const TreeComparison& result, const TreeOptions& opt
       options.alignment + (result.b_from_a ? ": moved by " + motion_text(*result.b_from_a) : ""),
       e.trees_a, e.trees_b, e.matched, options.assignment.radius_m,
       options.matching == "optimal" ? "best in position and diameter together" : "nearest first");
-  text += figures_text(e) + classes_text(result.by_diameter);
+  text += few_pairs_text(e, options) + figures_text(e) + classes_text(result.by_diameter);
   if (result.visible) {
     const VisibleTreeErrors& v = *result.visible;
     text += fmt::format(

@@ -1,3 +1,4 @@
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
@@ -9,6 +10,7 @@
 #include "understory/cli/register/register_features.h"
 #include "understory/cli/register/register_output.h"
 #include "understory/cli/register/register_stems.h"
+#include "understory/cli/suggestion.h"
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/recording/clouds/cloud_file.h"
@@ -16,6 +18,7 @@
 #include "understory/registration/global/match_verdict.h"
 #include "understory/registration/matchers.h"
 #include "understory/registration/two_clouds.h"
+#include "understory/util/angles.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -87,7 +90,27 @@ struct Loaded {
   Pose file_from_points;
 };
 
+// What a motion does at one place: in map coordinates the matrix alone hides it, since a small tilt
+// moves the far origin by kilometres.
+struct LocalMotion {
+  Eigen::Vector3d place;    // in the middle of B's extent, m, frame of B
+  Eigen::Vector3d shift_m;  // of that place
+  double turn_deg = 0.0;
+};
+
+LocalMotion motion_in_the_middle(const Pose& a_from_b, const Loaded& source) {
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& point : source.points)
+    box.extend(point);
+  LocalMotion motion;
+  motion.place = source.file_from_points * Eigen::Vector3d(box.center().cast<double>());
+  motion.shift_m = a_from_b * motion.place - motion.place;
+  motion.turn_deg = kDegPerRad * Eigen::AngleAxisd(a_from_b.rotation()).angle();
+  return motion;
+}
+
 Loaded load(const std::string& path, Log& log) {
+  refuse_folder(path);
   PointCloudFile file = read_cloud(path, log);
   require_metres(file.coordinate_system, path);
   return {std::move(file.points), std::move(file.ring),
@@ -128,10 +151,13 @@ MatchFrom matching(const RegisterOptions& options, const RegisterConfig& config,
   };
 }
 
-void print_json(const RegistrationResult& result, const MatchVerdict& verdict,
-                const Pose& a_from_b) {
+void print_json(const RegistrationResult& result, const MatchVerdict& verdict, const Pose& a_from_b,
+                const LocalMotion& local) {
   nlohmann::json out;
   out["a_from_b"] = numbers_of(a_from_b.matrix());
+  out["middle_of_b"] = numbers_of(local.place);
+  out["shift_there_m"] = numbers_of(local.shift_m);
+  out["turn_deg"] = local.turn_deg;
   out["status"] = to_string(result.status);
   out["reason"] = result.reason;
   out["fitness_m2"] = result.fitness_m2;
@@ -146,9 +172,13 @@ void print_json(const RegistrationResult& result, const MatchVerdict& verdict,
   std::printf("%s\n", out.dump(2).c_str());
 }
 
-void print_text(const RegistrationResult& result, const MatchVerdict& verdict,
-                const Pose& a_from_b) {
+void print_text(const RegistrationResult& result, const MatchVerdict& verdict, const Pose& a_from_b,
+                const LocalMotion& local) {
   print_motion(a_from_b);
+  const Eigen::Vector3d& p = local.place;
+  const Eigen::Vector3d& s = local.shift_m;
+  std::printf("middle_of_b %.3f %.3f %.3f\nshift_there_m %.3f %.3f %.3f\nturn_deg %.3f\n", p.x(),
+              p.y(), p.z(), s.x(), s.y(), s.z(), local.turn_deg);
   std::printf("status %s%s%s\n", to_string(result.status).c_str(),
               result.reason.empty() ? "" : ": ", result.reason.c_str());
   std::printf("fitness_m2 %.6f\nsurface_residual_m2 %.6f\ninlier_ratio %.4f\niterations %d\n",
@@ -176,11 +206,11 @@ GlobalRegistration registered(const RegisterOptions& options, const RegisterConf
 }
 
 int print_registration(const RegisterOptions& options, const GlobalRegistration& done,
-                       const Pose& a_from_b, CommandContext& context) {
+                       const Pose& a_from_b, const LocalMotion& local, CommandContext& context) {
   if (options.json)
-    print_json(done.result, done.verdict, a_from_b);
+    print_json(done.result, done.verdict, a_from_b, local);
   else
-    print_text(done.result, done.verdict, a_from_b);
+    print_text(done.result, done.verdict, a_from_b, local);
   const std::string damage = found(context.log, Finding::kDamage).first;
   if (!damage.empty()) {
     context.log.warn("register.untrusted", "a cloud is not whole: " + damage);
@@ -219,7 +249,8 @@ int run_register(const RegisterOptions& options, CommandContext& context) {
       options, config, target, source, a_from_target.inverse() * guess * source.file_from_points);
   const Pose a_from_b =
       a_from_target * done.result.target_from_source * source.file_from_points.inverse();
-  return print_registration(options, done, a_from_b, context);
+  return print_registration(options, done, a_from_b, motion_in_the_middle(a_from_b, source),
+                            context);
 }
 
 }  // namespace

@@ -251,6 +251,25 @@ TEST(SelfCorrection, ASolutionThatBlursTheMapIsRefused) {
   }
 }
 
+// P0-7: the map never gets worse than its best. By default methods that solve all pairs at once may
+// blur it within the noise of beta. Asked not to, they end no blurrier than they began.
+TEST(SelfCorrection, AskedNotToTheyEndNoBlurrierAtAll) {
+  Drive seen = drive(7);
+  seen.problem.world_from_view = seen.truth;
+  for (std::size_t k = 1; k < seen.truth.size(); ++k)
+    seen.problem.steps[k] = seen.truth[k - 1].inverse() * seen.truth[k];
+  int blurred = 0;
+  for (const CorrectionMethod method :
+       {CorrectionMethod::kPoseGraph, CorrectionMethod::kGaussianProcess,
+        CorrectionMethod::kExpectedGain}) {
+    blurred += self_correct(seen.problem, with(method)).blur.deviations > 0.0 ? 1 : 0;
+    SelfCorrectionConfig strict = with(method);
+    strict.blurrier_sd = 0.0;
+    EXPECT_LE(self_correct(seen.problem, strict).blur.deviations, 0.0) << static_cast<int>(method);
+  }
+  EXPECT_GT(blurred, 0);  // else this shows nothing
+}
+
 TEST(SelfCorrection, SameForAnyNumberOfThreads) {
   const Drive seen = drive(8);
   for (const CorrectionMethod method :

@@ -26,9 +26,10 @@ std::unique_ptr<OGRCoordinateTransformation> way_to_globe(OGRLayer& layer,
                                                           const fs::path& package) {
   const OGRSpatialReference* system = layer.GetSpatialRef();
   if (system == nullptr || system->IsLocal() != 0)
-    throw InputError(package.string(), layer.GetName(),
-                     "has no place on the globe, and GeoJSON is in longitude and latitude; put the "
-                     "run on the globe by `understory georeference` first");
+    throw InputError(
+        package.string(), layer.GetName(),
+        "has no place on the globe, which GeoJSON needs: `understory georeference` gives "
+        "a run one, and `understory inventory --crs` a cloud");
   OGRSpatialReference globe;
   globe.SetWellKnownGeogCS("WGS84");
   globe.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);

@@ -65,17 +65,27 @@ std::string path_svg(const std::vector<ReportScan>& scans, const MapView& view, 
   return svg + "</g>";
 }
 
-std::string marker(const Eigen::Vector3f& point, const MapView& view, const char* text) {
-  const Eigen::Vector2d at = view.at(point);
+// `left`: the text stands left of the circle.
+std::string marker(const Eigen::Vector2d& at, const char* text, bool left) {
   const double x = at.x();
   const double y = at.y();
   return fmt::format(
       "<g class=\"mark\" data-x=\"{0:.1f}\" data-y=\"{1:.1f}\"><circle cx=\"{0:.1f}\" "
       "cy=\"{1:.1f}\" "
       "r=\"6\" fill=\"#fff\" stroke=\"#111\" stroke-width=\"2\"/><text x=\"{2:.1f}\" y=\"{3:.1f}\" "
-      "font-size=\"15\" font-weight=\"600\" "
+      "font-size=\"15\" font-weight=\"600\" text-anchor=\"{5}\" "
       "stroke=\"#fff\" stroke-width=\"4\" paint-order=\"stroke\">{4}</text></g>",
-      x, y, x + 9, y + 5, text);
+      x, y, left ? x - 9 : x + 9, y + 5, text, left ? "end" : "start");
+}
+
+// Start and end of the way. Where they are near each other, their texts stand apart.
+std::string markers(const Eigen::Vector2d& start, const Eigen::Vector2d& end) {
+  constexpr double kTextWidth = 60.0;
+  constexpr double kTextHeight = 20.0;
+  const Eigen::Vector2d apart = end - start;
+  const bool near = std::abs(apart.x()) < kTextWidth && std::abs(apart.y()) < kTextHeight;
+  const bool start_left = near && apart.x() >= 0.0;
+  return marker(end, "end", near && !start_left) + marker(start, "start", start_left);
 }
 
 std::string loops_svg(const std::vector<ReportLoop>& loops, const MapView& view) {
@@ -258,8 +268,7 @@ std::string map_svg(const ReportInput& input, const MapView& view) {
   if (!input.fixes.empty()) svg += fixes_svg(input.fixes, view);
   svg += path_svg(input.scans, view, input.moved);
   if (!input.scans.empty()) {
-    svg += marker(input.scans.back().position, view, "end");
-    svg += marker(input.scans.front().position, view, "start");
+    svg += markers(view.at(input.scans.front().position), view.at(input.scans.back().position));
   }
   if (input.inventory != nullptr) svg += look_svg(*input.inventory, view);
   if (grid) svg += grid_svg(view);

@@ -62,7 +62,7 @@ std::string figure_row(const std::string& name, const StandFigures& figures,
 std::string figure_table(const StandTable& stand) {
   const std::vector<FigureColumn> columns =
       figure_columns(stand.config.species != TaperSpecies::kUnknown);
-  std::string html = "<div class=\"scroll\"><table class=\"sort\"><thead><tr><th>plot</th>";
+  std::string html = "<div class=\"scroll\"><table class=\"sort figures\"><thead><tr><th>plot</th>";
   for (const FigureColumn& column : columns)
     html += fmt::format("<th class=\"n\">{}</th>", column.title);
   html += "</tr></thead><tbody>" + figure_row("all that was seen", stand.seen, columns);
@@ -110,7 +110,8 @@ std::string class_chart(const StandTable& stand) {
   }
   if (histogram.counts.empty()) return "";
   histogram.counts.push_back(0);
-  return "<h3>Diameter distribution</h3>" + svg_histogram(histogram);
+  return "<h3>Diameter distribution</h3><div class=\"two\"><figure>" + svg_histogram(histogram) +
+         "</figure></div>";
 }
 
 }  // namespace

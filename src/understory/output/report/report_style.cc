@@ -45,7 +45,8 @@ border-radius:50%;margin-bottom:-1px}.legend i.box{width:13px;height:13px;border
 table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
 th,td{text-align:left;padding:3px 14px 3px 0;border-bottom:1px solid var(--rule);vertical-align:top}
 th.n,td.n{text-align:right}table.sort th{cursor:pointer;white-space:nowrap;background:var(--card)}
-table.sort th:hover{color:var(--line)}
+table.sort th:hover{color:var(--line)}table.figures th{white-space:normal}
+table.figures td{white-space:nowrap}
 .scroll{max-height:460px;overflow:auto}.wide{overflow-x:auto}code{font-size:.85em;overflow-wrap:anywhere}
 pre{overflow:auto;font-size:.82rem;max-height:480px}
 .files code{white-space:nowrap}

@@ -45,6 +45,22 @@ TEST(Report, EveryLoopThatWasTriedIsInTheTable) {
   EXPECT_NE(many.find("The first 40 of 90 are shown."), std::string::npos);
 }
 
+// "start" and "end" were drawn on each other where a way ends near its start.
+TEST(Report, LabelsOfAWayThatEndsNearItsStartStandApart) {
+  ReportInput input;
+  input.scans.resize(3);
+  input.scans[1].position = {50.0F, 30.0F, 0.0F};
+  const auto left_labels = [&](const Eigen::Vector3f& end) {
+    input.scans[2].position = end;
+    const std::string html = report_html(input);
+    EXPECT_NE(html.find(">start</text>"), std::string::npos);
+    return count_of(html, "font-weight=\"600\" text-anchor=\"end\"");
+  };
+  EXPECT_EQ(left_labels({0.5F, 0.0F, 0.0F}), 1U);
+  EXPECT_EQ(left_labels({-0.5F, 0.0F, 0.0F}), 1U);
+  EXPECT_EQ(left_labels({40.0F, 0.0F, 0.0F}), 0U);
+}
+
 // A user looks for the trees first; the table names what lies there, and no file of others.
 TEST(Report, ListsTheFilesThatLieBesideIt) {
   const std::string html = report_html(ReportInput(), {"run.json", "notes.txt", "trees.csv"});

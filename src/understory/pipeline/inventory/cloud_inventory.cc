@@ -374,7 +374,8 @@ RunOutcome run_inventory(const InventoryRequest& request, Log& log, const Progre
   place.commit(log);
   place.forget_state();
   return documents.outcome((request.slice ? std::string() : terminal_notes(stock.inventory)) +
-                           fmt::format("{} trees{}; see {}", stock.inventory.trees.size(),
+                           fmt::format("{} tree{}{}; see {}", stock.inventory.trees.size(),
+                                       stock.inventory.trees.size() == 1 ? "" : "s",
                                        stand_in_words(stock.figures.table),
                                        (place.path() / "report.html").string()));
 }

@@ -5,6 +5,13 @@
 #include <cmath>
 
 namespace understory {
+namespace {
+
+// Square metres, those of a circle of 5.6 m radius, which is the smallest usual sample plot
+// [chosen].
+constexpr double kFewestSquareMetres = 100.0;
+
+}  // namespace
 
 void describe_stand(const StandResult& stand, RunDocuments& documents) {
   const StandFigures& seen = stand.table.seen;
@@ -34,6 +41,10 @@ void describe_stand(const StandResult& stand, RunDocuments& documents) {
         fmt::format("Heights and volumes of the stand are lower bounds. The tops of {} of {} trees "
                     "were not seen, and too few others were for a height curve.",
                     seen.heights_lower_bounds, seen.trees));
+  if (seen.seen_m2 > 0.0 && seen.seen_m2 < kFewestSquareMetres)
+    documents.remark("plots", fmt::format("Only {:.0f} m2 of ground were seen. Figures per hectare "
+                                          "say little of a stand from so small an area.",
+                                          seen.seen_m2));
   documents.count("plots", stand.table.plots.size());
   for (const std::string& remark : stand.remarks)
     documents.remark("plots", remark);
@@ -44,7 +55,10 @@ void describe_stand(const StandResult& stand, RunDocuments& documents) {
 std::string stand_in_words(const StandTable& stand) {
   const StandFigures& seen = stand.seen;
   if (!(seen.seen_m2 > 0.0)) return "";
-  std::string text = fmt::format("; {} of them on {:.3f} ha seen", seen.trees, seen.seen_m2 / 1e4);
+  const bool small = seen.seen_m2 < kFewestSquareMetres;
+  std::string text = fmt::format("; {} of them on {} seen", seen.trees,
+                                 small ? fmt::format("{:.0f} m2", seen.seen_m2)
+                                       : fmt::format("{:.3f} ha", seen.seen_m2 / 1e4));
   if (std::isfinite(seen.stems_per_ha.value))
     text +=
         fmt::format(", {:.0f} +- {:.0f} stems/ha", seen.stems_per_ha.value, seen.stems_per_ha.sd);

@@ -186,6 +186,31 @@ TEST(CloudFile, KeepsWhatIsThereOfACutFile) {
   EXPECT_EQ(test::count_of(log, "recording.damaged"), 1U);
 }
 
+// Points of three numbers (Newer College's binaries) came through as a scan of points in wrong
+// places.
+TEST(CloudFile, RefusesBinariesOfAnotherPointSize) {
+  const auto cloud_of = [](int numbers) {
+    Bytes bytes;
+    for (int i = 0; i < 1'600 * numbers; ++i) {
+      const int column = i % numbers;
+      const float value = column < 3 ? 20.0F * std::sin(0.7F * static_cast<float>(i)) : 0.5F;
+      const auto* raw = reinterpret_cast<const std::uint8_t*>(&value);
+      bytes.insert(bytes.end(), raw, raw + sizeof(value));
+    }
+    return bytes;
+  };
+  Log log;
+  EXPECT_EQ(read_cloud_bytes(cloud_of(4), log, "a.bin").points.size(), 1'600U);
+  for (const int numbers : {3, 5}) {
+    try {
+      (void)read_cloud_bytes(cloud_of(numbers), log, "a.bin");
+      ADD_FAILURE() << numbers << " numbers a point were taken for four";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("intensities are negative"), std::string::npos);
+    }
+  }
+}
+
 TEST(CloudFile, RefusesWithTheFileAndThePlace) {
   const auto message_of = [](const Bytes& bytes) {
     Log log;
@@ -374,6 +399,20 @@ TEST(CloudFile, KeepsWhatIsThereOfACutLas) {
   EXPECT_THROW((void)read_cloud_bytes(bytes, log), InputError);
   bytes.resize(100);
   EXPECT_THROW((void)read_cloud_bytes(bytes, log), InputError);
+}
+
+// A cut at the very end takes a part of LASzip's table of chunks away; no point came through.
+TEST(CloudFile, KeepsThePointsOfALazWhoseTableOfChunksIsCut) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "cloud.laz";
+  write_las(path, 1, true);
+  Bytes bytes = test::read_bytes(path);
+  for (int cut = 1; cut <= 6; ++cut) {
+    bytes.pop_back();
+    Log log;
+    EXPECT_EQ(read_cloud_bytes(bytes, log).points.size(), static_cast<std::size_t>(kCloudPoints))
+        << cut << " bytes cut";
+  }
 }
 
 TEST(CloudFile, ReadsRealClouds) {

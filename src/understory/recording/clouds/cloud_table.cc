@@ -53,6 +53,24 @@ PointCloud2Message CloudTable::message(TimeNs stamp) const {
   return message;
 }
 
+namespace {
+
+// Whether the fourth numbers cannot be intensities, which are never below zero. Coordinates are so
+// half the time, as where points of three or five numbers are read as points of four.
+bool shows_other_point_size(const CloudTable& table, std::size_t points) {
+  constexpr std::size_t kFewestPoints = 100;
+  std::size_t below = 0;
+  for (std::size_t i = 0; i < points; ++i) {
+    float intensity = 0.0F;
+    std::memcpy(&intensity, table.data.data() + i * table.point_step + 3 * sizeof(float),
+                sizeof(intensity));
+    below += intensity < 0.0F ? 1 : 0;
+  }
+  return points >= kFewestPoints && 10 * below > points;
+}
+
+}  // namespace
+
 CloudTable read_kitti(ByteSource& file, Log& log) {
   CloudTable table;
   table.format = "KITTI bin";
@@ -69,6 +87,11 @@ CloudTable read_kitti(ByteSource& file, Log& log) {
   if (2 * plausible <= whole) {
     throw InputError(file.name(), "byte 0",
                      "expected a KITTI cloud: x, y, z, intensity as 32-bit floats");
+  }
+  if (shows_other_point_size(table, whole)) {
+    throw InputError(file.name(), "byte 0",
+                     "expected a KITTI cloud: x, y, z, intensity as 32-bit floats. Over a tenth of "
+                     "the intensities are negative: its points have another size or order");
   }
   if (table.data.size() % table.point_step != 0) {
     report_finding(log, Finding::kDamage,

@@ -116,11 +116,14 @@ void read_uncompressed(ByteSource& file, const LasHeader& header, Log& log,
   report_break(file, header, read, log);
 }
 
+// Whether LASzip reads the table of chunks at the end of a file.
+enum class ChunkTable : std::uint8_t { kRead, kLeftOut };
+
 // Shows LASzip a file whose header holds its own record alone. LASzip frees what it has not yet
 // allocated when a record of a damaged header ends its reading. Points keep their places.
 class CleanedFile : public ByteSource {
  public:
-  explicit CleanedFile(ByteSource& file) : file_(file) {
+  CleanedFile(ByteSource& file, ChunkTable table) : file_(file) {
     std::vector<std::uint8_t> header;
     file.read(0, 375, header);
     const auto header_size = get<std::uint16_t>(header, 94);
@@ -144,7 +147,8 @@ class CleanedFile : public ByteSource {
     // before the first chunk: that means it was never written.
     table_at_ = points;
     file.read(points, sizeof(std::uint64_t), table_);
-    if (table_.size() == sizeof(std::uint64_t) && get<std::uint64_t>(table_, 0) >= file.size())
+    if (table_.size() == sizeof(std::uint64_t) &&
+        (table == ChunkTable::kLeftOut || get<std::uint64_t>(table_, 0) >= file.size()))
       std::memcpy(table_.data(), &table_at_, sizeof(table_at_));
   }
 
@@ -235,10 +239,10 @@ struct LaszipCloser {
 };
 
 // Decodes with LASzip until it gives up and hands parts of the points to `pass`.
-void decode_compressed(ByteSource& file, const LasHeader& header,
+void decode_compressed(ByteSource& file, const LasHeader& header, ChunkTable table,
                        const std::function<void(const std::vector<LasPoint>&)>& pass) {
   constexpr std::size_t kAtOnce = 1024;
-  CleanedFile cleaned(file);
+  CleanedFile cleaned(file, table);
   SourceBuffer buffer(cleaned);
   std::istream stream(&buffer);
   laszip_POINTER raw = nullptr;
@@ -315,13 +319,14 @@ class WatchedFile : public ByteSource {
 };
 
 // In the process that decodes: never returns.
-[[noreturn]] void serve_points(ByteSource& file, const LasHeader& header, int pipe) {
+[[noreturn]] void serve_points(ByteSource& file, const LasHeader& header, ChunkTable table,
+                               int pipe) {
   WatchedFile watched(file);
   for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGPIPE})
     std::signal(signal, SIG_DFL);
   limit_memory();
   try {
-    decode_compressed(watched, header, [&](const std::vector<LasPoint>& points) {
+    decode_compressed(watched, header, table, [&](const std::vector<LasPoint>& points) {
       if (!write_all(pipe, points.data(), points.size() * sizeof(LasPoint))) ::_exit(kGaveUp);
     });
   } catch (...) {
@@ -350,11 +355,11 @@ struct Decoding {
 };
 
 // LASzip reads and writes out of bounds on damaged data, so it decodes in a process of its own. If
-// that process ends early, what came before is kept.
-void read_compressed(ByteSource& file, const LasHeader& header, Log& log,
-                     const std::function<void(const LasPoint&)>& visit) {
+// that process ends early, what came before is kept. Returns the number of points.
+std::uint64_t read_apart(ByteSource& file, const LasHeader& header, ChunkTable table,
+                         const std::function<void(const LasPoint&)>& visit) {
   static_assert(std::is_trivially_destructible_v<LasPoint>);
-  const CleanedFile checked(file);
+  const CleanedFile checked(file, table);
   std::array<int, 2> ends{};
   if (::pipe(ends.data()) != 0) throw InternalError("no pipe for LASzip's process");
   Decoding decoding;
@@ -362,7 +367,7 @@ void read_compressed(ByteSource& file, const LasHeader& header, Log& log,
   decoding.process = ::fork();
   if (decoding.process == 0) {
     ::close(ends[0]);
-    serve_points(file, header, ends[1]);
+    serve_points(file, header, table, ends[1]);
   }
   ::close(ends[1]);
   if (decoding.process < 0) throw InternalError("no process for LASzip");
@@ -386,6 +391,14 @@ void read_compressed(ByteSource& file, const LasHeader& header, Log& log,
   }
   if (decoding.wait() == kUnreadable)
     throw ReadError(file.name(), "behind point " + std::to_string(read), EIO);
+  return read;
+}
+
+// A table of chunks that is there and not whole gives no point at all: LASzip then does without it.
+void read_compressed(ByteSource& file, const LasHeader& header, Log& log,
+                     const std::function<void(const LasPoint&)>& visit) {
+  std::uint64_t read = read_apart(file, header, ChunkTable::kRead, visit);
+  if (read == 0 && header.points > 0) read = read_apart(file, header, ChunkTable::kLeftOut, visit);
   report_break(file, header, read, log);
 }
 

@@ -207,13 +207,24 @@ void LineReader::load(BinaryReader& reader) {
     fail_next("expected the file that was read before");
 }
 
+namespace {
+
+// Spreadsheets of many countries write semicolons, and the names are then one.
+std::string expected_column(const std::string& column, const std::vector<std::string>& names) {
+  const bool semicolons = names.size() == 1 && names.front().find(';') != std::string::npos;
+  return "expected a column '" + column + "'" +
+         (semicolons ? ": columns are separated by commas, and here by semicolons" : "");
+}
+
+}  // namespace
+
 CsvReader::CsvReader(const std::filesystem::path& path, const std::vector<std::string>& required,
                      CsvFormat format)
     : lines_(path, format.edit), format_(std::move(format)) {
   if (format_.on_short_row) lines_.cut_long_lines();
   read_header();
   for (const std::string& name : required) {
-    if (!find({name})) fail("expected a column '" + name + "'");
+    if (!find({name})) fail(expected_column(name, names_));
   }
 }
 
@@ -248,7 +259,7 @@ std::optional<std::size_t> CsvReader::find(const std::vector<std::string>& names
 
 std::size_t CsvReader::require(const std::vector<std::string>& names) const {
   if (const auto column = find(names)) return *column;
-  fail("expected a column '" + names.front() + "'");
+  fail(expected_column(names.front(), names_));
 }
 
 bool CsvReader::next() {

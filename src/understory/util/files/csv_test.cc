@@ -58,6 +58,8 @@ TEST_F(Csv, SaysWhatIsWrongAndWhere) {
   EXPECT_NE(complaint([&] { CsvReader(plain("")); }).find("header line"), std::string::npos);
   EXPECT_NE(complaint([&] { CsvReader(plain("a,b\n"), {"c"}); }).find("column 'c'"),
             std::string::npos);
+  EXPECT_NE(complaint([&] { CsvReader(plain("a;b\n"), {"a"}); }).find("by semicolons"),
+            std::string::npos);
   CsvReader table(plain("a,b\n1,two\n3\n"), {"a"});
   ASSERT_TRUE(table.next());
   EXPECT_NE(complaint([&] { (void)table.number("b"); }).find("line 2: expected a number"),

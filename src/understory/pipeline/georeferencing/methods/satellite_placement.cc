@@ -51,8 +51,8 @@ void doubt(const GeoreferenceRequest& request, const MovableRun& run, const Sate
                                       std::get<double>(placement.figures.at("sd_turn_north_deg")));
   if (tilt_sd_deg > kMostHeadingSdDeg)
     placement.doubt(fmt::format(
-        "the tilt is uncertain by {:.1f} degrees (one standard deviation; {:.0f} at most): use "
-        "--method split or auto",
+        "the tilt is uncertain by {:.1f} degrees (one standard deviation; {:.0f} at most): "
+        "`understory georeference RUN --method split` takes it from the run",
         tilt_sd_deg, kMostHeadingSdDeg));
   if (!fit.height_known && request.terrain_model.empty())
     placement.doubt("the fixes have no heights: the height of the run is not that of the earth");

@@ -277,7 +277,9 @@ std::string terminal_summary(const RunSummary& summary, const TrajectoryFacts& t
                         scan->second.wall_ms.p99);
   }
   text += "\n" + carrier_in_words(summary);
-  text += fmt::format("{} trees\n", inventory.trees.size()) + terminal_notes(inventory);
+  text +=
+      fmt::format("{} tree{}\n", inventory.trees.size(), inventory.trees.size() == 1 ? "" : "s") +
+      terminal_notes(inventory);
   for (const std::string& reason : summary.reasons) {
     text += to_string(summary.status) + ": " + reason + "\n";
   }
