@@ -319,7 +319,7 @@ TEST(Inventory, ATopBehindACrownIsALowerBound) {
   for (int i = 0; i < 4000; ++i)
     plot.cloud.emplace_back(random.uniform(6.0, 18.0), random.uniform(8.0, 12.0),
                             plot.ground(10.0, 10.0) + random.uniform(14.5, 22.0));
-  const auto bound_from = [&](double height_m) {
+  const auto seen_from = [&](double height_m) {
     const Lookouts lookouts = [&](const Eigen::Vector3d& place) {
       // The view ends above the first top where nothing is in the way.
       const bool low = place.z() < plot.ground(4.0, 10.0) + 15.0;
@@ -330,10 +330,14 @@ TEST(Inventory, ATopBehindACrownIsALowerBound) {
     const InventoryResult result =
         take_inventory(blocks_of(plot.cloud), basic_inventory(), {}, lookouts);
     const Tree* tree = nearest(result.trees, 4.0, 10.0);
-    return tree == nullptr ? -1.0 : tree->height_is_lower_bound;
+    return tree == nullptr ? Tree() : *tree;
   };
-  EXPECT_EQ(bound_from(80.0), 0.0);  // over the other crown
-  EXPECT_EQ(bound_from(16.5), 1.0);  // through it
+  const Tree over = seen_from(80.0);  // the other crown
+  EXPECT_EQ(over.height_is_lower_bound, 0.0);
+  EXPECT_NEAR(over.height_sd_m, 1.0, 0.05);  // from afar: poorly seen
+  const Tree through = seen_from(16.5);
+  EXPECT_EQ(through.height_is_lower_bound, 1.0);
+  EXPECT_NEAR(through.height_sd_m, 2.0, 0.05);
 }
 
 TEST(Inventory, WideBeamsAreTakenAwayWhereSensorAndPlacesAreKnown) {
