@@ -7,7 +7,8 @@ endif()
 # One folder under src/understory is one static library understory_<name> (alias understory::<name>).
 #   SOURCES            explicit .cc files; without any the layer is headers only
 #   TOGETHER           how many files are compiled as one with UNDERSTORY_UNITY: 8. More save what their
-#                      headers cost, but for Eigen's types the compiler's time grows faster than their number
+#                      headers cost, but for Eigen's types the compiler's time grows faster than their number.
+#                      Layers of text, without such types, take more
 #   APART              further ones that are compiled by themselves, also with UNDERSTORY_UNITY: names in
 #                      them clash with others', or their loops are to be optimised for themselves
 #   TESTS              x_test.cc beside x.cc; together the GoogleTest program test_<name>

@@ -90,7 +90,7 @@ inline constexpr double kLate = 5.0;
 
 namespace scan_merger {  // recording/lidars/scan_merger.cc
 // ns from one common scan to the next, where no lidar gives two scans [chosen: 10 scans a second]
-inline constexpr std::int64_t kUsualPeriod = 100'000'000;
+inline constexpr std::int64_t kUsualPeriodNs = 100'000'000;
 // ns: the same at least [chosen: 50 scans a second, more than any spinning lidar]
 inline constexpr std::int64_t kShortestPeriod = 20'000'000;
 // ns: the same at most [chosen: one scan a second, less than any spinning lidar]

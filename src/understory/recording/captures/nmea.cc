@@ -78,7 +78,7 @@ std::optional<double> angle(std::string_view text, std::string_view hemisphere, 
 }
 
 // Field i, or empty beyond the last.
-struct Fields {
+struct SentenceFields {
   std::vector<std::string_view> fields;
   std::string_view operator[](std::size_t i) const {
     return i < fields.size() ? fields[i] : std::string_view();
@@ -90,7 +90,7 @@ struct Fields {
   }
 };
 
-void read_rmc(const Fields& f, NmeaSentence& out) {
+void read_rmc(const SentenceFields& f, NmeaSentence& out) {
   out.time_of_day = time_of_day(f[1]);
   const auto year = digits(f[9], 4, 2);
   if (year) {
@@ -108,14 +108,14 @@ void read_rmc(const Fields& f, NmeaSentence& out) {
   out.quality = mode == "D" ? 2 : mode == "R" ? 4 : mode == "F" ? 5 : mode == "N" ? 0 : 1;
 }
 
-void read_altitude(const Fields& f, std::size_t satellites, NmeaSentence& out) {
+void read_altitude(const SentenceFields& f, std::size_t satellites, NmeaSentence& out) {
   if (const auto count = number(f[satellites]); count && *count >= 0.0 && *count < 1000.0)
     out.satellites = static_cast<int>(*count);
   out.hdop = number(f[satellites + 1]);
   out.altitude_m = number(f[satellites + 2]);
 }
 
-void read_gga(const Fields& f, NmeaSentence& out) {
+void read_gga(const SentenceFields& f, NmeaSentence& out) {
   out.time_of_day = time_of_day(f[1]);
   const auto quality = digits(f[6], 0, 1);
   out.quality = quality.value_or(0);
@@ -125,7 +125,7 @@ void read_gga(const Fields& f, NmeaSentence& out) {
   out.geoid_separation_m = number(f[11]);
 }
 
-void read_gns(const Fields& f, NmeaSentence& out) {
+void read_gns(const SentenceFields& f, NmeaSentence& out) {
   out.time_of_day = time_of_day(f[1]);
   const std::string_view modes = f[6];
   const auto has = [&](char mode) { return modes.find(mode) != std::string_view::npos; };
@@ -137,12 +137,12 @@ void read_gns(const Fields& f, NmeaSentence& out) {
 }
 
 // The last three values; newer versions of the standard put a system number behind them.
-void read_gsa(const Fields& f, NmeaSentence& out) {
+void read_gsa(const SentenceFields& f, NmeaSentence& out) {
   out.hdop = number(f[16]);
   out.vdop = number(f[17]);
 }
 
-void read_zda(const Fields& f, NmeaSentence& out) {
+void read_zda(const SentenceFields& f, NmeaSentence& out) {
   out.time_of_day = time_of_day(f[1]);
   out.day = day_number(digits(f[4], 0, 4), digits(f[3], 0, 2), digits(f[2], 0, 2));
 }
@@ -154,24 +154,24 @@ std::optional<double> heading(std::string_view text) {
   return degrees;
 }
 
-void read_hdt(const Fields& f, NmeaSentence& out) {
+void read_hdt(const SentenceFields& f, NmeaSentence& out) {
   if (f[2] == "T") out.heading_deg = heading(f[1]);
 }
 
 // Mode A: of the receiver itself, neither estimated, by hand, simulated nor invalid.
-void read_ths(const Fields& f, NmeaSentence& out) {
+void read_ths(const SentenceFields& f, NmeaSentence& out) {
   if (f[2] == "A") out.heading_deg = heading(f[1]);
 }
 
 // $PSAT,HPR,time,heading,pitch,roll,type: by GNSS (N), not by the gyroscope (G).
-void read_hpr(const Fields& f, NmeaSentence& out) {
+void read_hpr(const SentenceFields& f, NmeaSentence& out) {
   out.time_of_day = time_of_day(f[2]);
   if (f[6] == "N") out.heading_deg = heading(f[3]);
 }
 
 // $PASHR,time,heading,T,roll,pitch,heave, their standard deviations (roll, pitch, heading), quality
 // of GNSS (0: none), of the IMU. Other sentences of that name have no time there.
-void read_hr(const Fields& f, NmeaSentence& out) {
+void read_hr(const SentenceFields& f, NmeaSentence& out) {
   const auto time = time_of_day(f[1]);
   if (!time || f[3] != "T") return;
   out.time_of_day = time;
@@ -262,7 +262,7 @@ std::optional<NmeaSentence> parse_nmea(std::string_view line) {
     if (error != std::errc() || end != hex.data() + 2 || hex.size() != 2 || stated != sum)
       return std::nullopt;
   }
-  const Fields fields{split(body, ",", false)};
+  const SentenceFields fields{split(body, ",", false)};
   if (fields[0].size() < 4) return std::nullopt;
   NmeaSentence out;
   if (fields[0] == "PSAT") {

@@ -84,7 +84,7 @@ std::size_t ScanMerger::start() {
   period_ = 0;
   for (std::size_t i = 1; i < scans.size(); ++i)
     period_ = std::max(period_, scans[i]->stamp - scans[i - 1]->stamp);
-  if (period_ <= 0) period_ = kUsualPeriod;
+  if (period_ <= 0) period_ = kUsualPeriodNs;
   period_ = std::clamp(period_, kShortestPeriod, kLongestPeriod);
   begin_ = first;
   begun_ = true;
