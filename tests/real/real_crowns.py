@@ -32,7 +32,8 @@ def inventory(cloud, folder):
     assert status.returncode == 0, status.stderr
     with open(run / "trees.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    return run, [{key: float(value) for key, value in row.items() if value} for row in rows]
+    return run, [{key: float(value) for key, value in row.items() if value and key not in ("species", "quality")}
+                 for row in rows]
 
 
 def matched(found, known):

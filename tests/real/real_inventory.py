@@ -44,7 +44,7 @@ def inventory(cloud, folder):
                             capture_output=True, text=True, check=False)
     assert status.returncode in (0, 4), status.stderr
     with open(run / "trees.csv", encoding="utf-8") as file:
-        return [{key: float(value) for key, value in row.items() if value}
+        return [{key: float(value) for key, value in row.items() if value and key not in ("species", "quality")}
                 for row in csv.DictReader(file)]
 
 

@@ -23,8 +23,7 @@ using Lookouts = std::function<std::vector<Eigen::Vector3d>(const Eigen::Vector3
 // - if the metre above the top would show fewer than two points, did the tree go on as in the metre
 //   below. That is their number times the ratio of how well both are seen;
 // - if points go on above the top: two or more within four metres, and a tenth of those of the
-// metre
-//   below, unless ghosts of other pulses fill the sky as well.
+//   metre below, unless ghosts of other pulses fill the sky as well.
 // Of the others some are less sure: that metre would show fewer than twelve, or the half metre
 // below the top has fewer than five. Where it is not known:
 // - of fewer than five points in the half metre below the top;

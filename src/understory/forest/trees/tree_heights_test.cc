@@ -7,6 +7,7 @@
 
 #include "understory/forest/inventory.h"
 #include "understory/forest/test_plot.h"
+#include "understory/util/random.h"
 
 namespace understory {
 namespace {
@@ -126,6 +127,37 @@ TEST(TreeHeights, ATreeThatGoesOnInAFewPointsIsALowerBound) {
   EXPECT_EQ(bound_with({16.6}, 0), 0.0);  // a stray
   EXPECT_EQ(bound_with(thinning, 0), 1.0);
   EXPECT_EQ(bound_with(thinning, 20), 0.0);
+}
+
+// A second crown stands between the scanner and the top of the first tree.
+TEST(TreeHeights, ATopBehindACrownIsALowerBound) {
+  TestPlot plot(29);
+  plot.add_ground(20.0, 40);
+  plot.add_stem({4.0, 10.0, 0.3});
+  plot.add_stem({14.0, 10.0, 0.3});
+  Random random(30);
+  for (int i = 0; i < 4000; ++i)
+    plot.cloud.emplace_back(random.uniform(6.0, 18.0), random.uniform(8.0, 12.0),
+                            plot.ground(10.0, 10.0) + random.uniform(14.5, 22.0));
+  const auto seen_from = [&](double height_m) {
+    const Lookouts lookouts = [&](const Eigen::Vector3d& place) {
+      // The view ends above the first top where nothing is in the way.
+      const bool low = place.z() < plot.ground(4.0, 10.0) + 15.0;
+      std::vector<Eigen::Vector3d> from = {{21.0, 10.0, 100.0 + height_m}};
+      if (low) from.push_back({-16.0, 10.0, 101.0});
+      return from;
+    };
+    const InventoryResult result =
+        take_inventory(blocks_of(plot.cloud), basic_inventory(), {}, lookouts);
+    const Tree* tree = nearest(result.trees, 4.0, 10.0);
+    return tree == nullptr ? Tree() : *tree;
+  };
+  const Tree over = seen_from(80.0);  // the other crown
+  EXPECT_EQ(over.height_is_lower_bound, 0.0);
+  EXPECT_NEAR(over.height_sd_m, 1.0, 0.05);  // from afar: poorly seen
+  const Tree through = seen_from(16.5);
+  EXPECT_EQ(through.height_is_lower_bound, 1.0);
+  EXPECT_NEAR(through.height_sd_m, 2.0, 0.05);
 }
 
 }  // namespace
