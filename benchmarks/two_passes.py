@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What an inventory makes of a cloud whose scans do not lie on each other.
 
-    benchmarks/two_passes.py [--scatter M]
+    benchmarks/two_passes.py [--scatter M] [RUN/map.laz ...]
 
 Makes a stand of 36 stems (10 to 44 cm, on a plain of 30 m) as two passes of a scanner saw it. The second pass is moved
 along x. Each pass saw all sides of each stem, or the same half, or the other half. Each row is a cloud. It has the stems
@@ -60,33 +60,66 @@ def write_cloud(path, points):
     cloud.write(path)
 
 
-def row_of(folder, side, apart, scatter):
-    points, truth = stand(apart, side, scatter)
-    write_cloud(folder / "cloud.laz", points)
-    subprocess.run([PROGRAM, "--quiet", "inventory", folder / "cloud.laz", "-o", folder / "out", "--overwrite"],
-                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
-    with open(folder / "out" / "trees.csv", encoding="utf-8") as table:
+def inventory_of(folder, name):
+    """Rows of trees.csv, and run.json, of the inventory of a cloud."""
+    out = folder / f"{name}.out"
+    done = subprocess.run([PROGRAM, "--quiet", "inventory", folder / f"{name}.laz", "-o", out], capture_output=True,
+                          text=True, check=False)
+    assert done.returncode in (0, 4), done.stderr
+    with open(out / "trees.csv", encoding="utf-8") as table:
         trees = list(csv.DictReader(table))
+    return trees, json.loads((out / "run.json").read_text(encoding="utf-8"))
+
+
+def tell(name, listed, run, truth, apart):
+    """One row: `truth` has x, y and diameter in the first pass."""
     errors = []
     for x, y, dbh in truth:
-        near = [t for t in trees if np.hypot(float(t["x"]) - x - 0.5 * apart, float(t["y"]) - y) < 0.5]
+        near = [t for t in listed if np.hypot(float(t["x"]) - x - 0.5 * apart, float(t["y"]) - y) < 0.5]
         errors += [(float(t["dbh_m"]) - dbh, float(t["dbh_sd_m"])) for t in near[:1]]
     error, sd = 100.0 * np.array(errors).T
-    run = json.loads((folder / "out" / "run.json").read_text(encoding="utf-8"))
-    words = ", ".join(f"{count} {word}" for word, count in collections.Counter(t["quality"] for t in trees).most_common())
-    print(f"| {side}, {100 * apart:.0f} cm | {len(trees)} | {error.mean():+.1f}, {np.sqrt(np.mean(error**2)):.1f} | {np.median(sd):.1f} | "
-          f"{100 * np.mean(np.abs(error) < 2 * sd):.0f} % | {words} | {'; '.join(run['reasons']) or run['status']} |", flush=True)
+    words = ", ".join(f"{count} {word}" for word, count in collections.Counter(t["quality"] for t in listed).most_common())
+    print(f"| {name}, {100 * apart:.0f} cm | {len(listed)} of {len(truth)} | {error.mean():+.1f}, {np.sqrt(np.mean(error**2)):.1f} | "
+          f"{np.median(sd):.1f} | {100 * np.mean(np.abs(error) < 2 * sd):.0f} % | {words} | {'; '.join(run['reasons']) or run['status']} |",
+          flush=True)
+
+
+def made_by_hand(folder, scatter):
+    for side in SIDES:
+        for apart in APART_M:
+            points, truth = stand(apart, side, scatter)
+            name = f"{side.replace(' ', '_')}_{apart}"
+            write_cloud(folder / f"{name}.laz", points)
+            tell(side, *inventory_of(folder, name), truth, apart)
+
+
+def torn_apart(folder, path, number):
+    """The cloud of a run whose points of the second half of its time are moved."""
+    cloud = laspy.read(path)
+    x, stamps = np.array(cloud.x), np.array(cloud.gps_time)
+    late = stamps > 0.5 * (stamps.min() + stamps.max())
+    truth = []
+    for apart in APART_M:
+        name = f"cloud{number}_{apart}"
+        cloud.x = x + apart * late
+        cloud.write(folder / f"{name}.laz")
+        listed, run = inventory_of(folder, name)
+        listed = [t for t in listed if t["dbh_m"]]
+        truth = truth or [(float(t["x"]), float(t["y"]), float(t["dbh_m"])) for t in listed]
+        tell(Path(path).parent.name, listed, run, truth, apart)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("clouds", nargs="*", metavar="RUN/map.laz")
     parser.add_argument("--scatter", type=float, default=0.008, help="of the points across the bark, m")
     given = parser.parse_args()
-    print("| second pass: saw, moved by | stems listed of 36 | diameters: bias, RMS, cm | sd, cm | within two | quality | result |\n|---|---|---|---|---|---|---|")
+    print("| cloud, second pass moved by | stems listed | diameters: bias, RMS, cm | sd, cm | within two | quality | result |\n|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as scratch:
-        for side in SIDES:
-            for apart in APART_M:
-                row_of(Path(scratch), side, apart, given.scatter)
+        for number, path in enumerate(given.clouds):
+            torn_apart(Path(scratch), path, number)
+        if not given.clouds:
+            made_by_hand(Path(scratch), given.scatter)
 
 
 if __name__ == "__main__":

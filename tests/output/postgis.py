@@ -248,6 +248,8 @@ def run_cases(server):
         crowns = folder / "crowns.geojson"
         none = program("convert", run, crowns, "--layer", "stems")
         assert none.returncode == 3 and "the file has trees" in none.stderr and not crowns.exists(), none
+        wrong = program("convert", run, folder / "walk.mcap", "--layer", "path")
+        assert wrong.returncode == 2 and "--layer" in wrong.stderr, wrong
         return f"{count} trees where PostGIS has them"
 
     try:

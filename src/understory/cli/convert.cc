@@ -183,6 +183,8 @@ int run_convert(const ConvertOptions& options, CommandContext& context) {
   const bool to_database = !options.layers.target.empty();
   if (to_database && !options.output.empty()) throw ConfigError({"expected OUT or --to, not both"});
   if (!to_database && options.output.empty()) throw ConfigError({"expected OUT, or --to PG:..."});
+  if (options.layers.layer != LayerConversion().layer && !is_layer_output(options.output))
+    throw ConfigError({"--layer names the layer of a .geojson; expected such an OUT"});
   if (to_database || is_layer_output(options.output)) {
     LayerConversion conversion = options.layers;
     conversion.input = options.input;
@@ -217,7 +219,7 @@ int run_convert(const ConvertOptions& options, CommandContext& context) {
 
 void add_layer_options(CLI::App& command, LayerConversion& layers) {
   command.add_option("--to", layers.target,
-                     "Trees and path of a run into a PostGIS database: PG:host=... dbname=...");
+                     "All layers of trees.gpkg into a PostGIS database: PG:host=... dbname=...");
   command.add_option("--layer", layers.layer, "Layer of trees.gpkg that a .geojson holds")
       ->capture_default_str();
   command.add_option("--schema", layers.schema, "Schema of the database")->capture_default_str();

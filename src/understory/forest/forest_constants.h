@@ -98,8 +98,8 @@ inline constexpr double kPlaneMedians = 2.5;
 }  // namespace cloud_shape
 
 namespace inventory {  // forest/inventory.cc
-// m that a radius gains per metre between two scans of half a stem, by the outline's measure of
-// that distance [tuned on clouds made by hand: 0.38, 0.43 and 0.45 at 3, 6 and 10 cm]
+// m that a radius gains per metre between two scans of half a stem. That distance is the one that
+// outlines tell [tuned on clouds made by hand: 0.38, 0.43 and 0.45 at 3, 6 and 10 cm]
 inline constexpr double kThickPerApart = 0.45;
 // m: edge of the cells that the area of a stand is counted in [chosen]
 inline constexpr double kAreaCell = 2.0;
@@ -240,8 +240,8 @@ inline constexpr double kBeside = 1.0;
 // lower bound [tuned on random seeds 3, 4, 5, 9, 16: 0 to 12 were tried; by chance two show none in
 // one case of seven]
 inline constexpr double kLeastExpected = 2.0;
-// The same for a top that was well seen [tuned on random seeds 8, 9, 16 and handheld seeds 3, 4, as
-// the limit of a lower bound, which it was: 5 to 20 were tried]
+// The same for a top that was well seen. It was the limit of a lower bound [tuned on random seeds
+// 8, 9, 16 and handheld seeds 3, 4: 5 to 20 were tried]
 inline constexpr double kWellExpected = 12.0;
 // Points within four metres above a top, at least, with which the tree goes on [tuned on the same
 // seeds: 2 to 8 were tried]

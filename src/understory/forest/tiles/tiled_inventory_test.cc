@@ -136,6 +136,12 @@ void expect_same(const InventoryResult& a, const InventoryResult& b) {
     EXPECT_EQ(one.id, other.id);
   }
   EXPECT_EQ(a.crown_outlines, b.crown_outlines);
+  EXPECT_EQ(a.two_images, b.two_images);
+  ASSERT_EQ(a.stems.size(), b.stems.size());
+  for (std::size_t i = 0; i < a.stems.size(); ++i) {
+    expect_same(a.stems[i].oval.x(), b.stems[i].oval.x());
+    expect_same(a.stems[i].oval.y(), b.stems[i].oval.y());
+  }
 }
 
 // The tree of each point, in the order of the cloud.

@@ -76,8 +76,10 @@ std::vector<CrownOutline> crown_outlines(const InventoryResult& inventory) {
   if (!inventory.crowns || inventory.crowns->crowns.empty()) return outlines;
   std::map<int, std::vector<PlaneRing>> of_cells = outlines_of_cells(*inventory.crowns);
   for (std::size_t i = 0; i < inventory.crown_ids.size(); ++i) {
-    if (inventory.crown_ids[i] != 0)
-      outlines.push_back({inventory.crown_ids[i], std::move(of_cells[static_cast<int>(i)])});
+    // A top beside a higher one may have no cell of its own.
+    const auto found = of_cells.find(static_cast<int>(i));
+    if (inventory.crown_ids[i] != 0 && found != of_cells.end())
+      outlines.push_back({inventory.crown_ids[i], std::move(found->second)});
   }
   return outlines;
 }

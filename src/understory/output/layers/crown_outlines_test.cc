@@ -19,10 +19,10 @@ double area_m2(const CrownOutline& crown) {
 }
 
 // A tree with a stem, and a canopy with the crowns A to C. A has a hole and a part that touches it
-// at a corner alone; B is no tree of the list.
+// at a corner alone; B is no tree of the list. A fourth crown has no cell.
 InventoryResult stem_and_canopy() {
   InventoryResult inventory;
-  inventory.trees.resize(4);
+  inventory.trees.resize(5);
   for (std::size_t i = 0; i < inventory.trees.size(); ++i)
     inventory.trees[i].id = static_cast<int>(i) + 1;
   inventory.trees[0].crown_area_m2 = 12.0;
@@ -30,7 +30,7 @@ InventoryResult stem_and_canopy() {
   inventory.crown_outlines = {{{0.0, 0.0}, {4.0, 0.0}, {4.0, 3.0}, {0.0, 3.0}}, {}};
   const std::string rows[] = {"AAA.BB", "A.A.BB", "AAA...", "...ACC"};  // from the south
   CanopyCrowns canopy;
-  canopy.crowns.resize(3);
+  canopy.crowns.resize(4);
   canopy.canopy.x0 = 100.0;
   canopy.canopy.y0 = 200.0;
   canopy.canopy.cell_m = 0.5;
@@ -42,13 +42,13 @@ InventoryResult stem_and_canopy() {
   }
   canopy.canopy.values.assign(canopy.owner.size(), 10.0F);
   inventory.crowns = canopy;
-  inventory.crown_ids = {3, 0, 4};
+  inventory.crown_ids = {3, 0, 4, 5};
   return inventory;
 }
 
 TEST(CrownOutlines, StemsHaveConvexOnesAndCanopiesThoseOfTheirCells) {
   const std::vector<CrownOutline> outlines = crown_outlines(stem_and_canopy());
-  ASSERT_EQ(outlines.size(), 3U) << "the second stem has no crown";
+  ASSERT_EQ(outlines.size(), 3U) << "the second stem has no crown, the fifth tree no cell";
   EXPECT_EQ(outlines[0].tree, 1);
   EXPECT_EQ(area_m2(outlines[0]), 12.0);
   EXPECT_EQ(outlines[1].tree, 3);

@@ -45,10 +45,27 @@ struct Folders {
 };
 
 // A run in its own frame is laid on the globe, turned by half a radian against the clock.
+struct PlacedRun {
+  Pose motion = Pose(so3_exp(Vector3d(0.0, 0.0, 0.5)), Vector3d(100.0, 50.0, 1.0));
+  LayerFrame layers = LayerFrame(Pose(), {61.2, 24.7, 150.0}, "EPSG:3067");
+  Folders folders;
+
+  // The trees.gpkg of the placed run.
+  GDALDatasetUniquePtr package_of(const InventoryResult& inventory,
+                                  const std::vector<StandPlot>& plots) {
+    const auto& [both, own, placed] = folders;
+    const LayerFrame local;
+    write_tree_layers(own, inventory, {}, local, plots);
+    write_tree_layers(placed, {tree_at_height(3.0)}, {}, layers);
+    add_moved_vectors(own / "trees.gpkg", placed / "trees.gpkg", {local, motion, layers});
+    const QuietGdal quiet;
+    return GDALDatasetUniquePtr(GDALDataset::Open((placed / "trees.gpkg").c_str(), GDAL_OF_VECTOR));
+  }
+};
+
 TEST(MovedVectors, PlotsAndPlacesGoWithTheRun) {
-  const Folders folders;
-  const auto& [both, own, placed] = folders;
-  const LayerFrame local;
+  PlacedRun run;
+  const auto& [motion, layers, folders] = run;
   LookAgain look;
   look.place = {12.0, -7.0, 2.0};
   look.towards = {0.0, 4.0};  // along the y axis
@@ -57,14 +74,7 @@ TEST(MovedVectors, PlotsAndPlacesGoWithTheRun) {
   InventoryResult inventory;
   inventory.trees = {tree_at_height(2.0)};
   inventory.look_again = {look};
-  write_tree_layers(own, inventory, {}, local, {circle_at(10.0, 20.0)});
-  const Pose motion(so3_exp(Vector3d(0.0, 0.0, 0.5)), Vector3d(100.0, 50.0, 1.0));
-  const LayerFrame layers(Pose(), {61.2, 24.7, 150.0}, "EPSG:3067");
-  write_tree_layers(placed, {tree_at_height(3.0)}, {}, layers);
-  add_moved_vectors(own / "trees.gpkg", placed / "trees.gpkg", {local, motion, layers});
-  const QuietGdal quiet;
-  const GDALDatasetUniquePtr dataset(
-      GDALDataset::Open((placed / "trees.gpkg").c_str(), GDAL_OF_VECTOR));
+  const GDALDatasetUniquePtr dataset = run.package_of(inventory, {circle_at(10.0, 20.0)});
   ASSERT_NE(dataset, nullptr);
   OGRLayer* plots = dataset->GetLayerByName("plots");
   OGRLayer* looks = dataset->GetLayerByName("look_again");
@@ -101,21 +111,14 @@ TEST(MovedVectors, PlotsAndPlacesGoWithTheRun) {
 }
 
 TEST(MovedVectors, CrownsGoWithTheRun) {
-  const Folders folders;
-  const auto& [both, own, placed] = folders;
-  const LayerFrame local;
+  PlacedRun run;
+  const auto& [motion, layers, folders] = run;
   InventoryResult inventory;
   inventory.trees = {tree_at_height(2.0)};
   inventory.trees[0].crown_base_m = 7.5;
   inventory.crown_outlines = {{{1.0, 2.0}, {5.0, 2.0}, {5.0, 7.0}, {1.0, 7.0}}};
-  write_tree_layers(own, inventory, {}, local, {});
-  const Pose motion(so3_exp(Vector3d(0.0, 0.0, 0.5)), Vector3d(100.0, 50.0, 1.0));
-  const LayerFrame layers(Pose(), {61.2, 24.7, 150.0}, "EPSG:3067");
-  write_tree_layers(placed, {tree_at_height(3.0)}, {}, layers);
-  add_moved_vectors(own / "trees.gpkg", placed / "trees.gpkg", {local, motion, layers});
-  const QuietGdal quiet;
-  const GDALDatasetUniquePtr dataset(
-      GDALDataset::Open((placed / "trees.gpkg").c_str(), GDAL_OF_VECTOR));
+  const GDALDatasetUniquePtr dataset = run.package_of(inventory, {});
+  ASSERT_NE(dataset, nullptr);
   OGRLayer* crowns = dataset->GetLayerByName("crowns");
   ASSERT_NE(crowns, nullptr);
   EXPECT_STREQ(crowns->GetSpatialRef()->GetAuthorityCode(nullptr), "3067");
