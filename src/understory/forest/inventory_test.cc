@@ -78,6 +78,19 @@ TEST(Inventory, AFullOneHasCurvesVolumesCrownsAndTheTreeOfEachPoint) {
   EXPECT_EQ(tree_at(result, {8.5, 3.0, plot.ground(8.5, 3.0) + 2.0}, 2.0), 0U);
 }
 
+TEST(Inventory, OutlinesOfCrownsAreInTheFrameOfTheCloud) {
+  TestPlot plot(4);
+  plot.add_ground(18.0, 40);
+  plot.add_stem({5.0, 9.0, 0.3});
+  for (Eigen::Vector3d& point : plot.cloud)
+    point += Eigen::Vector3d(1000.0, 2000.0, 0.0);
+  const InventoryResult result = take_inventory(blocks_of(plot.cloud), {});
+  ASSERT_EQ(result.crown_outlines.size(), 1U);
+  ASSERT_GT(result.crown_outlines[0].size(), 4U);
+  for (const Eigen::Vector2d& corner : result.crown_outlines[0])
+    EXPECT_LT((corner - Eigen::Vector2d(1005.0, 2009.0)).norm(), 3.0);
+}
+
 // Two trees whose crowns touch: on a sheet the points of the other one are marked.
 TEST(Inventory, SheetsShowTheTreesAndWhatIsNotTheirOwn) {
   TestPlot plot(4);

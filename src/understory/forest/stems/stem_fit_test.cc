@@ -109,5 +109,35 @@ TEST(StemFit, NoPointsAreNoStem) {
   EXPECT_FALSE(fit_stem({}, start_of_rings(0.18, 0.0), {}).converged);
 }
 
+// Two passes that saw another half each, moved apart along x.
+TEST(StemFit, ItsOutlineTellsOfTwoPasses) {
+  Random random(11);
+  auto points = stem_points(0.15, 0.0, 360.0, 2000, 0.004, random);
+  const StemFit round = fit_stem(points, start_of_rings(0.15, 0.0), {}).stem;
+  ASSERT_TRUE(round.oval.allFinite());
+  EXPECT_LT(round.oval.norm(), 0.001);
+  for (SlicePoint& point : points)
+    point.x += point.x > 1.0F ? 0.05F : 0.0F;
+  const StemFit apart = fit_stem(points, start_of_rings(0.15, 0.0), {}).stem;
+  ASSERT_TRUE(apart.oval.allFinite());
+  EXPECT_NEAR(apart.oval.x(), 2.0 / (3.0 * M_PI) * 0.05, 0.003);
+  EXPECT_NEAR(apart.oval.y(), 0.0, 0.002);
+}
+
+// Noise along one line of sight lies all around a thin stem, and is no outline.
+TEST(StemFit, NoiseOfOneViewIsNoOutline) {
+  Random random(12);
+  const StemFit thick =
+      fit_stem(stem_points(0.05, 0.0, 360.0, 2000, 0.015, random), start_of_rings(0.05, 0.0), {})
+          .stem;
+  EXPECT_FALSE(thick.oval.allFinite()) << "scatters by " << thick.rms_m;
+  auto points = stem_points(0.15, 0.0, 180.0, 2000, 0.004, random);
+  for (const SlicePoint& point : stem_points(0.15, 0.0, 360.0, 60, 0.004, random))
+    points.push_back(point);
+  const StemFit one_view = fit_stem(points, start_of_rings(0.15, 0.0), {}).stem;
+  EXPECT_GT(one_view.arc_deg, 300.0);
+  EXPECT_FALSE(one_view.oval.allFinite()) << "nearly all points are on one side";
+}
+
 }  // namespace
 }  // namespace understory
