@@ -101,6 +101,13 @@ namespace inventory {  // forest/inventory.cc
 // m that a radius gains per metre between two scans of half a stem. That distance is the one that
 // outlines tell [tuned on clouds made by hand: 0.38, 0.43 and 0.45 at 3, 6 and 10 cm]
 inline constexpr double kThickPerApart = 0.45;
+// m: standard deviation of the radius of a stem within foliage, beside that of its fit. Noise
+// as wide as the stem hides its width [tuned on lohja1 seed 3]
+inline constexpr double kFoliageRadiusSd = 0.006;
+// m: least diameter of a tree that is listed, of a full inventory ... [bound: noise of lidars]
+inline constexpr double kThinnest = 0.02;
+// ... and of a basic one, which a map takes at its end [chosen: from here on trees count]
+inline constexpr double kThinnestBasic = 0.05;
 // m: edge of the cells that the area of a stand is counted in [chosen]
 inline constexpr double kAreaCell = 2.0;
 // m above the ground: higher points are no tree [bound: the tallest trees have 116 m]
@@ -206,6 +213,14 @@ inline constexpr double kSigmas = 4.0;
 inline constexpr double kLeastTip = 5.0;
 }  // namespace height_column
 
+namespace low_heights {  // forest/trees/low_heights.h
+// Share of all points below which a height counts as empty [chosen: ghosts]
+inline constexpr double kFewPoints = 0.001;
+// Share of the mean of the metre below that the last full decimetre of a cut has at least [chosen:
+// a cut has 1, young pines of lohja1 0.01]
+inline constexpr double kCutShare = 0.3;
+}  // namespace low_heights
+
 namespace tree_heights {  // forest/trees/tree_heights.cc
 // m around a stem in which its top is looked for [chosen]
 inline constexpr double kCrownReach = 1.5;
@@ -215,6 +230,10 @@ inline constexpr double kCell = 1.0;
 inline constexpr int kLargestGap = 3;
 // m over the slices: less is no tree top [chosen]
 inline constexpr double kLeastAbove = 1.5;
+// m: radius of a stem whose tree may be lower than the slices, at most [chosen]
+inline constexpr double kLowTreeRadius = 0.05;
+// Decimetres without points that a low tree's crown may have [chosen]
+inline constexpr int kLowGap = 5;
 // m above breast height over which a stem leans as it does below; farther up it stands upright
 // [not recorded]
 inline constexpr double kStraight = 6.0;

@@ -73,7 +73,9 @@ void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3
     stem.beam_excess_m = excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg);
     stem.radius_m -= stem.beam_excess_m;
     const double sd = diameter_sd_m(stem.spread_m, stem.arc_deg, range, stem.beam);
-    stem.covariance(2, 2) = 0.25 * sd * sd + stem.below_sd_m * stem.below_sd_m;
+    const double foliage_sd_m = stem.in_foliage ? kFoliageRadiusSd : 0.0;
+    stem.covariance(2, 2) =
+        0.25 * sd * sd + stem.below_sd_m * stem.below_sd_m + foliage_sd_m * foliage_sd_m;
   }
 }
 
@@ -262,6 +264,13 @@ void remark(const StemHarvest& gathered, const InventoryConfig& config, Inventor
 
 }  // namespace
 
+StemDetectorConfig search_of(StemDetectorConfig config, InventoryExtent extent) {
+  if (config.min_dbh_m == 0.0)
+    config.min_dbh_m = extent == InventoryExtent::kFull ? kThinnest : kThinnestBasic;
+  config.min_dbh_m = std::max(config.min_dbh_m, kThinnest);
+  return config;
+}
+
 void describe(ConfigTable& table, InventoryConfig& config) {
   table.add_enum(
       "extent", config.extent,
@@ -337,6 +346,7 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
                        slices,
                        gathered.ceiling,
                        config.stems.highest_m,
+                       scanner.lookouts || !gathered.low.end_in_a_cut(),
                        full,
                        static_cast<bool>(scanner.lookouts),
                        config.curves,
@@ -394,7 +404,8 @@ InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& c
   result.origin = {kOriginStep * std::floor(terrain.x0 / kOriginStep),
                    kOriginStep * std::floor(terrain.y0 / kOriginStep), terrain.z0};
   tell("stems", 2.0);
-  StemHarvest gathered = find_stems(cloud, result.ground, result.origin, config.stems, progress);
+  StemHarvest gathered = find_stems(cloud, result.ground, result.origin,
+                                    search_of(config.stems, config.extent), progress);
   result.points = gathered.points;
   result.slices = std::move(gathered.slices);
   result.stems = std::move(gathered.stems);

@@ -33,11 +33,20 @@ namespace understory {
 // crowns and the tree of each point as well.
 enum class InventoryExtent { kBasic, kFull };
 
+// The search for stems with the least diameter of 0, which stands for that of the extent.
+[[nodiscard]] inline StemDetectorConfig least_diameter_by_extent() {
+  StemDetectorConfig config;
+  config.min_dbh_m = 0.0;
+  return config;
+}
+// The same with the diameter that it stands for: 2 cm in a full inventory, else 5 cm.
+[[nodiscard]] StemDetectorConfig search_of(StemDetectorConfig config, InventoryExtent extent);
+
 // Settings of `understory inventory` and of the trees of a map.
 struct InventoryConfig {
   InventoryExtent extent = InventoryExtent::kFull;
   GroundConfig ground;
-  StemDetectorConfig stems;
+  StemDetectorConfig stems = least_diameter_by_extent();
   BeamConfig beam;
   StemCurveConfig curves;
   CanopyCrownConfig crowns;  // of a full inventory

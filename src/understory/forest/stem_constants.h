@@ -146,6 +146,8 @@ inline constexpr double kSameOfSmaller = 0.3;
 inline constexpr double kClaimScatters = 2.5;
 // m: the same at least [not recorded]
 inline constexpr double kClaimBand = 0.015;
+// m: diameter of a thin stem within foliage at most: a thicker one shows its surface [chosen]
+inline constexpr double kFoliageDbh = 0.1;
 // m around the radius in which points of a leaning stem are looked for [not recorded]
 inline constexpr double kLeanReach = 1.2;
 // m beyond the radius whose points belong to a stem [not recorded]
@@ -217,7 +219,7 @@ inline constexpr int kTurns = 36;
 inline constexpr double kLeanReach = 0.3;
 }  // namespace not_a_tree
 
-namespace ring_linker {  // forest/stems/ring_linker.cc
+namespace ring_linker {  // forest/search/ring_linker.cc
 // m: edge of the cells in which rings of other slices are looked for [chosen]
 inline constexpr double kRingCell = 1.0;
 // m by which the radii of two rings of one stem differ at most ... [not recorded]
@@ -293,6 +295,14 @@ inline constexpr double kThinTryFill = 0.7;
 inline constexpr double kThinTryArc = 0.5;
 // Share of points off the surface that a thin stem may have more [not recorded]
 inline constexpr double kThinStrays = 0.05;
+// m outside of the surface: points that a thin stem within foliage is fitted to [chosen]
+inline constexpr double kFoliageReach = 0.06;
+// Share of these that may be of the foliage, at most [chosen]
+inline constexpr double kFoliageStrays = 0.9;
+// m: a thinner stem within foliage counts as this thin [bound: noise of lidars]
+inline constexpr double kFoliageLeastRadius = 0.01;
+// Of these the fit takes so many at most: few of them are of the stem [bound: time]
+inline constexpr int kFoliagePoints = 1000;
 // Steps of 10 degrees that hold points on a stem seen all round ... [chosen]
 inline constexpr double kOvalBins = 30.0;
 // ... degrees over which these points would spread if they lay evenly ... [tuned on random 8]
@@ -360,8 +370,6 @@ inline constexpr double kLeastView = 1e-4;
 inline constexpr double kFirstScatterLeast = 0.01;
 // m: the same at most [not recorded]
 inline constexpr double kFirstScatterMost = 0.03;
-// m beyond the radius over which points of no stem are spread [not recorded]
-inline constexpr double kStrayReach = 0.1;
 // Points of a fit at least [bound: six parameters]
 inline constexpr std::size_t kFewestPoints = 8;
 // m: a fit whose step is shorter has ended [not recorded]
@@ -387,8 +395,6 @@ inline constexpr double kFarthest = 0.5;
 inline constexpr double kFirstStrays = 0.05;
 // The same at least [not recorded]
 inline constexpr double kLeastStrays = 0.005;
-// The same at most [not recorded]
-inline constexpr double kMostStrays = 0.5;
 // Rounds in which the seen directions are found [bound: convergence]
 inline constexpr int kViewRounds = 4;
 }  // namespace noisy_cylinder
@@ -422,7 +428,7 @@ inline constexpr int kApart = 3;
 inline constexpr double kMostCells = 4e6;
 }  // namespace standing_direction
 
-namespace circle_search {  // forest/stems/circle_search.cc
+namespace circle_search {  // forest/search/circle_search.cc
 // Pairs of points that are tried with a drawn one [bound: time]
 inline constexpr int kTriesPerDraw = 9;
 // m: edge of the cells that count points on a circle [bound: time]
@@ -455,7 +461,7 @@ inline constexpr double kLengthOffset = 0.15;
 inline constexpr double kInsideWeight = 1.5;
 }  // namespace circle_search
 
-namespace point_groups {  // forest/stems/point_groups.cc
+namespace point_groups {  // forest/search/point_groups.cc
 // m: edge of the windows that large groups are cut by. The origin of a search is a multiple of it
 // [bound: time]
 inline constexpr double kWindow = 8.0;

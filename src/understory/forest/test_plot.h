@@ -67,6 +67,19 @@ class TestPlot {
                          ground(stem.x, stem.y) + random_.uniform(4.0, 15.0));
     }
   }
+  // A young tree that is green to the ground: its stem is hidden among the points of its branches.
+  void add_young_tree(double x, double y, double dbh, double height, int points = 3'000) {
+    for (int i = 0; i < points; ++i) {
+      const double h = random_.uniform(0.1, height);
+      const double turn = random_.uniform(0.0, 2.0 * M_PI);
+      const bool on_stem = i % 8 == 0;
+      const double crown = 0.7 * (1.0 - h / height) + 0.1;
+      const double r = on_stem ? 0.5 * dbh : crown * std::sqrt(random_.uniform());
+      const double noise = on_stem ? 0.01 : 0.0;
+      cloud.emplace_back(x + r * std::cos(turn) + random_.normal(0.0, noise),
+                         y + r * std::sin(turn) + random_.normal(0.0, noise), ground(x, y) + h);
+    }
+  }
   // A bush: points all through a ball.
   void add_bush(double x, double y, double radius, int points) {
     for (int i = 0; i < points;) {

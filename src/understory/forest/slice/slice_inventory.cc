@@ -167,7 +167,8 @@ InventoryResult take_slice(const PointBlocks& unasked, const std::string& name,
       thinner.add(point.x() - result.origin.x(), point.y() - result.origin.y(), kBreastHeight);
   });
   result.slices = thinner.take();
-  const std::vector<SliceStem> stems = measure_slice(result.slices, config.stems, progress);
+  const std::vector<SliceStem> stems =
+      measure_slice(result.slices, search_of(config.stems, InventoryExtent::kBasic), progress);
   for (const SliceStem& slice : stems) {
     result.stems.push_back(slice.stem);
     result.trees.push_back(tree_of(result, slice.stem, static_cast<int>(result.stems.size())));

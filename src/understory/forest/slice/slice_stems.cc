@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstdint>
 
+#include "understory/forest/search/circle_search.h"
 #include "understory/forest/slice_constants.h"
 #include "understory/forest/stem_constants.h"
-#include "understory/forest/stems/circle_search.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/stems/stem_fit.h"
 #include "understory/util/parallel.h"

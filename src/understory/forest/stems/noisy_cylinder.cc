@@ -73,7 +73,7 @@ class Estimator {
     radius_ = start.radius_m;
     taper_ = start.taper;
     scatter_ = std::clamp(start.rms_m, kFirstScatterLeast, kFirstScatterMost);
-    const double reach = radius_ + kStrayReach;
+    const double reach = radius_ + config.stray_reach_m;
     stray_density_ = 1.0 / (M_PI * reach * reach);
   }
 
@@ -261,7 +261,7 @@ class Estimator {
     std::vector<double> seen(visible_.size(), 0.0);
     for (const FlatPoint& point : flat_)
       add_point(point, sums, seen);
-    if (sums.weight < kLeastWeight * total_) return false;
+    if (sums.weight < std::min(kLeastWeight, 1.0 - config_.most_strays) * total_) return false;
     result.log_likelihood = sums.log_likelihood / total_;
     const double s2 = scatter_ * scatter_;
     const auto prior = [&](int i, double value, double sd) {
@@ -273,7 +273,8 @@ class Estimator {
     prior(5, config_.usual_taper, config_.taper_sd);
     const Matrix6 normal = sums.normal.selfadjointView<Eigen::Upper>();
     const SymmetricSolver<6> solver(normal);
-    const Vector6 found = solver.solve(sums.right);
+    Vector6 found = solver.solve(sums.right);
+    found[4] = std::max(found[4], config_.held_radius_m);
     if (!found.allFinite() || found[4] < kLeastRadius || found.head<2>().norm() > kFarthest)
       return false;
     centre_ = found.head<2>();
@@ -282,7 +283,7 @@ class Estimator {
     taper_ = found[5];
     result.covariance = s2 * solver.inverse();
     scatter_ = std::clamp(std::sqrt(0.5 * sums.square / sums.weight), kLeastScatter, kMostScatter);
-    strays_ = std::clamp(1.0 - sums.weight / total_, kLeastStrays, kMostStrays);
+    strays_ = std::clamp(1.0 - sums.weight / total_, kLeastStrays, config_.most_strays);
     learn_views(seen);
     return true;
   }

@@ -35,6 +35,9 @@ struct NoisyCylinderConfig {
   double slope_sd = 0.03;       // how far the slope may leave that of the start
   int max_points = 400;         // every n-th where there are more
   int cycles = 20;              // of two steps and an extrapolation, at most
+  double stray_reach_m = 0.1;   // beyond the radius: points of no stem are spread so far
+  double most_strays = 0.5;     // share of the returns that are of no stem, at most
+  double held_radius_m = 0.0;   // a smaller radius is held at this one; 0: such a fit fails
 };
 
 // Points should be those within about 10 cm of the stem's surface. Deterministic.

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <functional>
 
+#include "understory/forest/search/circle_search.h"
+#include "understory/forest/search/foliage_columns.h"
+#include "understory/forest/search/point_groups.h"
+#include "understory/forest/search/ring_linker.h"
 #include "understory/forest/stem_constants.h"
-#include "understory/forest/stems/circle_search.h"
 #include "understory/forest/stems/not_a_tree.h"
-#include "understory/forest/stems/point_groups.h"
-#include "understory/forest/stems/ring_linker.h"
+#include "understory/forest/stems/point_index.h"
 #include "understory/forest/stems/stem_fit.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
@@ -18,60 +20,6 @@ namespace understory {
 namespace {
 
 using namespace stem_constants::stem_detector;
-
-// Points sorted by square of the ground, to gather those around a stem. Those of a square, and of
-// squares side by side, follow each other.
-class PointIndex {
- public:
-  explicit PointIndex(std::vector<SlicePoint>& points) : end_(points.size()) {
-    std::sort(points.begin(), points.end(), [](const SlicePoint& a, const SlicePoint& b) {
-      const std::uint64_t cell_a = key(a);
-      const std::uint64_t cell_b = key(b);
-      if (cell_a != cell_b) return cell_a < cell_b;
-      if (a.x != b.x) return a.x < b.x;
-      if (a.y != b.y) return a.y < b.y;
-      return a.height_m != b.height_m ? a.height_m < b.height_m : a.returns < b.returns;
-    });
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const std::uint64_t cell = key(points[i]);
-      if (cells_.empty() || cells_.back().key != cell) cells_.push_back({cell, i});
-    }
-  }
-
-  // Calls visit(index) for the points of all squares within `reach` along either axis.
-  template <typename Visit>
-  void near(const Eigen::Vector2d& centre, double reach, const Visit& visit) const {
-    const int r1 = cell(static_cast<float>(centre.y() + reach));
-    const int c0 = cell(static_cast<float>(centre.x() - reach));
-    const int c1 = cell(static_cast<float>(centre.x() + reach));
-    for (int r = cell(static_cast<float>(centre.y() - reach)); r <= r1; ++r) {
-      const std::size_t end = first_from(key(c1, r) + 1);
-      for (std::size_t i = first_from(key(c0, r)); i < end; ++i)
-        visit(i);
-    }
-  }
-
- private:
-  struct Cell {
-    std::uint64_t key;
-    std::size_t first;  // of its points
-  };
-  [[nodiscard]] std::size_t first_from(std::uint64_t wanted) const {
-    const auto found =
-        std::lower_bound(cells_.begin(), cells_.end(), wanted,
-                         [](const Cell& a, std::uint64_t value) { return a.key < value; });
-    return found == cells_.end() ? end_ : found->first;
-  }
-  static int cell(float value) { return static_cast<int>(std::floor(value / 0.5F)); }
-  static std::uint64_t key(int column, int row) {
-    return static_cast<std::uint64_t>(static_cast<std::int64_t>(row) + (1LL << 31)) << 32 |
-           static_cast<std::uint64_t>(static_cast<std::int64_t>(column) + (1LL << 31));
-  }
-  static std::uint64_t key(const SlicePoint& point) { return key(cell(point.x), cell(point.y)); }
-
-  std::vector<Cell> cells_;
-  std::size_t end_;
-};
 
 // One way of cutting the points: thin slices for dense clouds, thick ones for what is left of
 // sparse clouds.
@@ -294,7 +242,10 @@ void describe(ConfigTable& table, StemDetectorConfig& config) {
   table.add("slice_m", config.slice_m, {0.05, 1.0}, "m", "thickness of a slice");
   table.add("thin_m", config.thin_m, {0.0, 0.1}, "m",
             "one point is kept in each cube of this size");
-  table.add("min_dbh_m", config.min_dbh_m, {0.02, 1.0}, "m", "smallest diameter that is searched");
+  table.add(
+      "min_dbh_m", config.min_dbh_m, {0.0, 1.0}, "m",
+      "smallest diameter that is searched, 0.02 at least; 0: 0.02 in a full inventory, 0.05 in "
+      "a basic one and in a slice");
   table.add("max_dbh_m", config.max_dbh_m, {0.1, 5.0}, "m", "largest diameter that is searched");
   table.add("min_returns", config.min_returns, {5, 100'000}, "",
             "fewest returns on the surface of a stem");
@@ -353,6 +304,23 @@ struct Search {
   }
 };
 
+// The points near a stem that no other one explains.
+std::vector<SlicePoint> unexplained_near(const Search& search, const StemFit& stem,
+                                         const StemDetectorConfig& config) {
+  const double reach =
+      stem.radius_m + kStartReach + stem.slope.norm() * (config.highest_m - kBreastHeight);
+  std::vector<SlicePoint> near;
+  const StemAxis axis(stem);
+  const double within = stem.radius_m + kFitReach;
+  search.index.near(stem.centre, reach, [&](std::size_t k) {
+    const SlicePoint& point = search.points[k];
+    if (search.explained[k] == 0 && axis.may_be_within(point, within) &&
+        axis.place(point).distance_m < within)
+      near.push_back(point);
+  });
+  return near;
+}
+
 // Fits that are stems by themselves.
 std::vector<StemFitResult> fit_starts(const Search& search, const std::vector<StemFit>& starts,
                                       const Cut& cut, const StemDetectorConfig& config,
@@ -361,19 +329,8 @@ std::vector<StemFitResult> fit_starts(const Search& search, const std::vector<St
   std::vector<char> accepted(starts.size(), 0);
   parallel_for(starts.size(), 1, [&](std::size_t i) {
     progress.poll();
-    const StemFit& start = starts[i];
-    const double reach =
-        start.radius_m + kStartReach + start.slope.norm() * (config.highest_m - kBreastHeight);
-    std::vector<SlicePoint> near;
-    const StemAxis axis(start);
-    const double within = start.radius_m + kFitReach;
-    search.index.near(start.centre, reach, [&](std::size_t k) {
-      const SlicePoint& point = search.points[k];
-      if (search.explained[k] == 0 && axis.may_be_within(point, within) &&
-          axis.place(point).distance_m < within)
-        near.push_back(point);
-    });
-    fits[i] = fit_stem(near, start, config);
+    const std::vector<SlicePoint> near = unexplained_near(search, starts[i], config);
+    fits[i] = fit_stem(near, starts[i], config);
     accepted[i] = is_stem(fits[i], cut, config) ? 1 : 0;
     if (accepted[i] != 0) {
       fits[i] = refine_stem(near, fits[i], config);
@@ -389,15 +346,19 @@ std::vector<StemFitResult> fit_starts(const Search& search, const std::vector<St
   return fits;
 }
 
-void add_stems(const Cut& cut, const StemDetectorConfig& config, const StemSearchArea& where,
-               const ProgressSink& progress, Search& search) {
-  const std::vector<Ring> rings =
-      find_rings(search.points, search.explained, cut, config, where, progress);
-  std::vector<StemFit> starts = link_rings(rings, cut.min_slices, config.max_lean_deg);
-  const GroundArea fitted = where.area.grown(kFitsBeyond);
-  std::erase_if(starts, [&](const StemFit& start) { return !fitted.contains(start.centre); });
-  std::vector<StemFitResult> fits = fit_starts(search, starts, cut, config, progress);
-  sort_by_support(fits);
+// A thin stem within foliage: neither does its surface stand clear, nor is its inside empty.
+bool is_foliage_stem(const StemFitResult& fit, const std::vector<SlicePoint>& near,
+                     const Search& search, const StemDetectorConfig& config) {
+  const StemFit& stem = fit.stem;
+  return fit.converged && 2.0 * stem.radius_m >= config.min_dbh_m &&
+         2.0 * stem.radius_m <= kFoliageDbh && fit.evidence.returns >= config.min_returns &&
+         lean_deg_of(stem) <= kAloneLeanDeg && stands_in_foliage(near, stem) &&
+         is_tree(stem, search.index, search.points, config);
+}
+
+// Adds what no better stem explains.
+void add_unclaimed(const std::vector<StemFitResult>& fits, const StemDetectorConfig& config,
+                   Search& search) {
   for (const StemFitResult& fit : fits) {
     const auto overlaps = [&](const StemFit& other) { return same_stem(fit.stem, other); };
     if (std::any_of(search.stems.begin(), search.stems.end(), overlaps)) continue;
@@ -410,6 +371,34 @@ void add_stems(const Cut& cut, const StemDetectorConfig& config, const StemSearc
   }
 }
 
+void add_foliage_stems(const StemDetectorConfig& config, const StemSearchArea& where,
+                       const ProgressSink& progress, Search& search) {
+  const std::vector<StemFit> columns =
+      find_foliage_columns(search.points, search.explained, config, where, progress);
+  std::vector<StemFitResult> fits(columns.size());
+  parallel_for(columns.size(), 1, [&](std::size_t i) {
+    progress.poll();
+    const std::vector<SlicePoint> near = unexplained_near(search, columns[i], config);
+    fits[i] = fit_in_foliage(near, columns[i], config);
+    fits[i].stem.in_foliage = true;
+    fits[i].converged = is_foliage_stem(fits[i], near, search, config);
+  });
+  std::erase_if(fits, [](const StemFitResult& fit) { return !fit.converged; });
+  add_unclaimed(fits, config, search);
+}
+
+void add_stems(const Cut& cut, const StemDetectorConfig& config, const StemSearchArea& where,
+               const ProgressSink& progress, Search& search) {
+  const std::vector<Ring> rings =
+      find_rings(search.points, search.explained, cut, config, where, progress);
+  std::vector<StemFit> starts = link_rings(rings, cut.min_slices, config.max_lean_deg);
+  const GroundArea fitted = where.area.grown(kFitsBeyond);
+  std::erase_if(starts, [&](const StemFit& start) { return !fitted.contains(start.centre); });
+  std::vector<StemFitResult> fits = fit_starts(search, starts, cut, config, progress);
+  sort_by_support(fits);
+  add_unclaimed(fits, config, search);
+}
+
 }  // namespace
 
 std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points, const StemDetectorConfig& config,
@@ -417,6 +406,7 @@ std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points, const StemDet
   Search search(points);
   for (const StemCut cut : {StemCut::kThin, StemCut::kThick})
     add_stems(cut_of(cut, config), config, where, progress, search);
+  add_foliage_stems(config, where, progress, search);
   sort_by_place(search.stems);
   return search.stems;
 }
@@ -429,7 +419,10 @@ std::vector<StemFit> detect_stems_in_cut(StemCut cut, std::vector<SlicePoint>& p
   Search search(points);
   for (const StemFit& stem : known)
     search.know(stem);
-  add_stems(cut_of(cut, config), config, where, progress, search);
+  if (cut == StemCut::kFoliage)
+    add_foliage_stems(config, where, progress, search);
+  else
+    add_stems(cut_of(cut, config), config, where, progress, search);
   std::vector<StemFit> stems(search.stems.begin() + static_cast<std::ptrdiff_t>(known.size()),
                              search.stems.end());
   std::erase_if(stems, [&](const StemFit& stem) { return !where.area.contains(stem.centre); });

@@ -58,6 +58,7 @@ struct StemFit {
   double spread_m = 0.0;    // of the radius, if returns were independent; see diameter_sd_m
   double below_sd_m = 0.0;  // of the radius: how the taper may differ below what was seen
   double rms_m = 0.0;       // of the points on the surface
+  bool in_foliage = false;  // a thin column that foliage surrounds; see foliage_columns.h
   double arc_deg = 0.0;     // covered by points
   // How its outline differs from a circle: metres that the second harmonic adds to the radius, as a
   // vector of twice its direction. NaN where it was not seen all round.
@@ -88,7 +89,7 @@ struct StemSearchArea {
 // at thick ones, among the points that no stem of the first explains. Of a cloud in tiles the
 // second has to know those of the first beyond the tile. Gives the stems with the centre in the
 // area.
-enum class StemCut { kThin, kThick };
+enum class StemCut { kThin, kThick, kFoliage };
 [[nodiscard]] std::vector<StemFit> detect_stems_in_cut(StemCut cut, std::vector<SlicePoint>& points,
                                                        const std::vector<StemFit>& known,
                                                        const StemDetectorConfig& config,

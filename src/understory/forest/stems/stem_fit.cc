@@ -286,6 +286,22 @@ void set_uncertainty(const NoisyCylinder& fit, StemFit& stem) {
   stem.foot_covariance = factor * foot * fit.covariance * foot.transpose();
 }
 
+// Makes the noisy cylinder the stem of the result, if it is one, and takes the figures anew.
+void take_over(const NoisyCylinder& fit, const std::vector<SlicePoint>& points,
+               const StemDetectorConfig& config, StemFitResult& result) {
+  result.converged = fit.converged && 2.0 * fit.radius_m <= config.max_dbh_m;
+  if (!result.converged) return;
+  StemFit& stem = result.stem;
+  stem.centre = fit.centre;
+  stem.slope = fit.slope;
+  stem.radius_m = fit.radius_m;
+  stem.taper = fit.taper;
+  result.evidence.scatter_m = std::clamp(fit.scatter_m, kLeastScatter, kMostScatter);
+  judge(points, config, result);
+  result.evidence.scatter_m = fit.scatter_m;
+  set_uncertainty(fit, stem);
+}
+
 }  // namespace
 
 StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& start,
@@ -345,17 +361,25 @@ StemFitResult refine_stem(const std::vector<SlicePoint>& points, const StemFitRe
       best = thin;
   }
   StemFitResult result = fit;
-  result.converged = best.converged && 2.0 * best.radius_m <= config.max_dbh_m;
-  if (!result.converged) return result;
-  StemFit& stem = result.stem;
-  stem.centre = best.centre;
-  stem.slope = best.slope;
-  stem.radius_m = best.radius_m;
-  stem.taper = best.taper;
-  result.evidence.scatter_m = std::clamp(best.scatter_m, kLeastScatter, kMostScatter);
-  judge(points, config, result);
-  result.evidence.scatter_m = best.scatter_m;
-  set_uncertainty(best, stem);
+  take_over(best, points, config, result);
+  return result;
+}
+
+StemFitResult fit_in_foliage(const std::vector<SlicePoint>& points, const StemFit& column,
+                             const StemDetectorConfig& config) {
+  NoisyCylinderConfig foliage;
+  foliage.stray_reach_m = kFoliageReach;
+  foliage.most_strays = kFoliageStrays;
+  foliage.max_points = kFoliagePoints;
+  foliage.held_radius_m = kFoliageLeastRadius;
+  std::vector<SlicePoint> near;
+  const StemAxis axis(column);
+  for (const SlicePoint& point : points) {
+    if (axis.surface_error(point) < kFoliageReach) near.push_back(point);
+  }
+  StemFitResult result;
+  result.stem = column;
+  take_over(fit_noisy_cylinder(near, column, foliage), points, config, result);
   return result;
 }
 

@@ -44,4 +44,9 @@ struct StemFitResult {
 [[nodiscard]] StemFitResult refine_stem(const std::vector<SlicePoint>& points,
                                         const StemFitResult& fit, const StemDetectorConfig& config);
 
+// The same for a thin stem within foliage, from a column that shows in it. Points of the foliage
+// lie on all sides of it, and most of those near it may be theirs.
+[[nodiscard]] StemFitResult fit_in_foliage(const std::vector<SlicePoint>& points,
+                                           const StemFit& column, const StemDetectorConfig& config);
+
 }  // namespace understory

@@ -100,7 +100,7 @@ class TileAbove {
                      }
                    });
     for (std::size_t i = 0; i < around_.stems.size(); ++i)
-      tops_.push_back(columns_.top(i, task_.slices_end_m));
+      tops_.push_back(columns_.top(i, task_.slices_end_m, task_.low_tops));
     // Near a scanner the ground has a hundred times the points of a crown, and the ceiling may lie
     // under the crown. A point below the top of its tree is real.
     for (const HeldBack& point : held_back_) {

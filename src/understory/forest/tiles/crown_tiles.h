@@ -29,8 +29,9 @@ struct CrownTask {
   const SlicesNear& slices;
   const CanopyCeiling& ceiling;  // settled
   double slices_end_m;
-  bool full;   // stem curves and crowns as well
-  bool space;  // what stands in the way of a view as well
+  bool low_tops;  // trees may end below that: see TreeColumns::top
+  bool full;      // stem curves and crowns as well
+  bool space;     // what stands in the way of a view as well
   const StemCurveConfig& curves;
   const ProgressSink& progress;
 };

@@ -21,6 +21,7 @@ using forest_constants::inventory::kHighest;
 // Of one tile.
 struct GatheredTile {
   CanopyCeiling ceiling;
+  LowHeights low;
   CoverageGrid coverage;
   SeenCells seen;
   std::uint64_t points = 0;
@@ -61,6 +62,7 @@ class StemTiles {
     for (std::size_t tile = 0; tile < gathered.size(); ++tile) {
       GatheredTile& part = gathered[tile];
       harvest.ceiling.add(part.ceiling);
+      harvest.low.add(part.low);
       harvest.coverage.add(part.coverage);
       harvest.seen.add(part.seen);
       harvest.points += part.points;
@@ -81,7 +83,7 @@ class StemTiles {
       }
       return harvest;
     }
-    for (const StemCut cut : {StemCut::kThin, StemCut::kThick}) {
+    for (const StemCut cut : {StemCut::kThin, StemCut::kThick, StemCut::kFoliage}) {
       search(harvest.stems, 0.0, [&](Nearby nearby, const StemSearchArea& where) {
         return detect_stems_in_cut(cut, nearby.slices, nearby.stems, config_, where, progress_);
       });
@@ -126,6 +128,7 @@ class StemTiles {
         if (here && height < config_.highest_m) part.seen.add(place, height);
         if (!(height >= 0.0 && height <= kHighest)) continue;
         if (here) part.ceiling.count(place, height);
+        if (here) part.low.add(height);
         if (here && height < config_.highest_m) part.coverage.add(place);
         if (!(height >= config_.lowest_m && height < highest_searched)) continue;
         const bool near_breast = height < config_.highest_m;

@@ -10,6 +10,7 @@
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/tiles/tile_shelf.h"
 #include "understory/forest/tiles/tiled_cloud.h"
+#include "understory/forest/trees/low_heights.h"
 #include "understory/forest/trees/thin_coverage.h"
 #include "understory/util/progress.h"
 
@@ -21,6 +22,7 @@ struct StemHarvest {
   std::uint64_t points = 0;
   std::uint64_t without_ground = 0;
   std::uint64_t near_breast = 0;  // points in the heights that are searched
+  LowHeights low;
   CoverageGrid coverage;
   SeenCells seen;
   std::vector<SlicePoint> slices;  // see InventoryResult

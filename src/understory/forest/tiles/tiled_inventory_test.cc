@@ -91,6 +91,9 @@ const Cloud& strip_of_stems() {
                                 plot.ground(x, y) + random.uniform(2.8, 6.0));
       }
     }
+    // Young trees, on borders of tiles and beside them.
+    for (const double x : {19.9, 25.1, 40.6, 49.95, 75.0})
+      plot.add_young_tree(x, 17.0 + std::sin(x), 0.035, 3.2);
     for (int i = 0; i < 24'000; ++i) {
       const double x = random.uniform(0.0, 100.0);
       const double y = 20.0 + 4.0 * std::sin(0.2 * x) + random.normal(0.0, 0.04);
@@ -169,6 +172,9 @@ TEST(TiledInventory, TheSameTreesWhateverTheTilesAre) {
   const auto hidden = std::count_if(whole.stems.begin(), whole.stems.end(),
                                     [](const StemFit& stem) { return stem.below_sd_m > 0.0; });
   EXPECT_GE(hidden, 3);
+  const auto young = std::count_if(whole.stems.begin(), whole.stems.end(),
+                                   [](const StemFit& stem) { return stem.in_foliage; });
+  EXPECT_GE(young, 3);
   const std::vector<std::uint32_t> labels = labels_of(whole, nullptr);
   bool backwards = false;
   for (const double tile_m : {128.0, 50.0, 25.0, 20.3}) {

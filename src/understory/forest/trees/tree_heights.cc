@@ -71,7 +71,19 @@ std::size_t TreeColumns::add(const Eigen::Vector3d& point, double height_m) {
   return nearest;
 }
 
-double TreeColumns::top(std::size_t stem, double slices_end_m) const {
+double TreeColumns::top(std::size_t stem, double slices_end_m, bool low_tops) const {
+  const double high = high_top(stem, slices_end_m);
+  const bool thin = stems_[stem].in_foliage || stems_[stem].radius_m <= kLowTreeRadius;
+  if (!low_tops || !thin) return high;
+  const double low = low_top(stem);
+  // The crown of a young tree begins at its foot, and a gap above it leads to another's. Elsewhere
+  // a gap may be a stem of few points.
+  const bool ends_low =
+      stems_[stem].in_foliage ? low < slices_end_m + kLeastAbove : std::isnan(high);
+  return ends_low ? low : high;
+}
+
+double TreeColumns::high_top(std::size_t stem, double slices_end_m) const {
   const Column& column = columns_[stem];
   const int first = static_cast<int>(slices_end_m);
   const int end = column.connected_end(first, kLargestGap);
@@ -79,6 +91,19 @@ double TreeColumns::top(std::size_t stem, double slices_end_m) const {
   const auto height =
       static_cast<double>(column.highest_m[static_cast<std::size_t>(column.top(first, end))]);
   return height >= slices_end_m + kLeastAbove ? height : std::numeric_limits<double>::quiet_NaN();
+}
+
+double TreeColumns::low_top(std::size_t stem) const {
+  const Column& column = columns_[stem];
+  const int begin = decimetre_of(stems_[stem].lowest_m);
+  int last = begin;
+  for (int d = begin; d <= last + kLowGap && d < static_cast<int>(column.decimetres.size()); ++d) {
+    if (column.decimetres[static_cast<std::size_t>(d)] > 0) last = d;
+  }
+  // To a decimetre; to the point itself where no other one is above it in its metre.
+  const double end = 0.1 * (last + 1);
+  const auto highest = static_cast<double>(column.highest_m[HeightColumn::metre_of(0.1 * last)]);
+  return std::min(end, std::max(highest, end - 0.05));
 }
 
 int TreeColumns::points_below(std::size_t stem, double height_m, int decimetres) const {

@@ -28,8 +28,10 @@ class TreeColumns {
   // Height of a tree's top above the ground. The top is the highest point that hangs together with
   // its stem, with gaps of at most 3 m. It is nearer to its stem than to any other. Ghosts of other
   // pulses are left aside (see HeightColumn). NaN where nothing is seen above the stem's slices.
-  // NaN also where the points end as if cut off just above them: that is no tree top.
-  [[nodiscard]] double top(std::size_t stem, double slices_end_m) const;
+  // NaN also where the points end as if cut off just above them: that is no tree top. With
+  // `low_tops` the cloud is known to show all heights. A thin tree may then end lower, where the
+  // points end that hang together with its stem. Their gaps are of half a metre at most.
+  [[nodiscard]] double top(std::size_t stem, double slices_end_m, bool low_tops = false) const;
   [[nodiscard]] double ground_m(std::size_t stem) const { return ground_m_[stem]; }
   // Points in so many decimetres below a height; of each decimetre 255 stand for more.
   [[nodiscard]] int points_below(std::size_t stem, double height_m, int decimetres) const;
@@ -41,6 +43,8 @@ class TreeColumns {
     std::array<float, kMetres> highest_m{};               // within each metre
     std::array<std::uint8_t, 10 * kMetres> decimetres{};  // points of each
   };
+  [[nodiscard]] double high_top(std::size_t stem, double slices_end_m) const;
+  [[nodiscard]] double low_top(std::size_t stem) const;
   // Points of the decimetres [begin, end).
   [[nodiscard]] int points_within(std::size_t stem, int begin, int end) const;
 

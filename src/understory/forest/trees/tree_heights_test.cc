@@ -67,6 +67,33 @@ TEST(TreeHeights, NoTopIsInvented) {
   EXPECT_NEAR(columns.top(2, 3.5), 6.0, 0.06);
 }
 
+TEST(TreeHeights, AThinTreeMayEndBelowTheSlicesOfACloudThatShowsAllHeights) {
+  std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0), stem_with_slope(10.0, 0.0),
+                                stem_with_slope(20.0, 0.0), stem_with_slope(30.0, 0.0),
+                                stem_with_slope(40.0, 0.0)};
+  for (StemFit& stem : stems) {
+    stem.radius_m = 0.02;
+    stem.in_foliage = true;
+    stem.lowest_m = 0.6;
+  }
+  stems[3].in_foliage = false;
+  stems[4].in_foliage = false;
+  TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
+  add_crown(columns, 0.0, 0.0, 0.6, 2.63);
+  add_crown(columns, 10.0, 0.0, 0.6, 3.1);
+  add_crown(columns, 10.0, 0.0, 4.1, 14.0);  // a tree above it
+  add_crown(columns, 20.0, 0.0, 0.6, 9.0);
+  add_crown(columns, 30.0, 0.0, 0.6, 4.2);
+  add_crown(columns, 40.0, 0.0, 0.6, 3.9);
+  add_crown(columns, 40.0, 0.0, 5.1, 9.0);  // a part of the stem was not seen
+  const std::vector<double> tops = {2.63, 3.1, 9.0, 4.2, 9.0};
+  for (std::size_t i = 0; i < tops.size(); ++i)
+    EXPECT_NEAR(columns.top(i, 3.5, true), tops[i], 0.06) << i;
+  EXPECT_TRUE(std::isnan(columns.top(0, 3.5)));
+  stems[3].radius_m = 0.1;  // no thick tree is so low
+  EXPECT_TRUE(std::isnan(columns.top(3, 3.5, true)));
+}
+
 // A point of the crown a metre down a slope of 27 degrees stands 50 cm higher over its own ground.
 TEST(TreeHeights, OnASlopeTheyCountFromTheFootOfTheTree) {
   const std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0)};

@@ -1,4 +1,4 @@
-#include "understory/forest/stems/circle_search.h"
+#include "understory/forest/search/circle_search.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "understory/forest/stems/point_groups.h"
+#include "understory/forest/search/point_groups.h"
 
 #include <algorithm>
 #include <array>

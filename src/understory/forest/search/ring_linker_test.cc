@@ -1,4 +1,4 @@
-#include "understory/forest/stems/ring_linker.h"
+#include "understory/forest/search/ring_linker.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "understory/forest/stems/circle_search.h"
+#include "understory/forest/search/circle_search.h"
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -7,10 +7,10 @@
 #include <numeric>
 #include <utility>
 
+#include "understory/forest/search/cell_index.h"
+#include "understory/forest/search/point_groups.h"
 #include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/arc_bins.h"
-#include "understory/forest/stems/cell_index.h"
-#include "understory/forest/stems/point_groups.h"
 #include "understory/geometry/symmetric_solver.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"

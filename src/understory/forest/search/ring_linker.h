@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "understory/forest/stems/circle_search.h"
+#include "understory/forest/search/circle_search.h"
 #include "understory/forest/stems/stem_detector.h"
 
 namespace understory {

@@ -1,0 +1,38 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "understory/forest/inventory.h"
+#include "understory/forest/test_plot.h"
+
+namespace understory {
+namespace {
+
+TEST(YoungTrees, GreenToTheGroundAreListedByAFullInventory) {
+  TestPlot plot(8);
+  plot.slope_x = 0.1;
+  plot.add_ground(20.0, 60);
+  plot.add_stem({3.0, 3.0, 0.3});
+  const std::vector<Eigen::Vector2d> places = {{6.0, 6.0}, {7.3, 6.2}, {12.0, 9.0}, {10.0, 15.0}};
+  for (const Eigen::Vector2d& place : places)
+    plot.add_young_tree(place.x(), place.y(), 0.035, 3.2);
+  const InventoryResult full = take_inventory(blocks_of(plot.cloud), {});
+  EXPECT_EQ(full.trees.size(), places.size() + 1);
+  for (const Eigen::Vector2d& place : places) {
+    const Tree* tree = nearest(full.trees, place.x(), place.y());
+    ASSERT_NE(tree, nullptr) << place.transpose();
+    EXPECT_LT(std::hypot(tree->x - place.x(), tree->y - place.y()), 0.06);
+    EXPECT_NEAR(tree->dbh_m, 0.035, 2.0 * tree->dbh_sd_m);
+    EXPECT_GT(tree->dbh_sd_m, 0.01);
+    EXPECT_NEAR(tree->height_m, 3.2, 0.2);
+  }
+  // A map's own list begins at 5 cm.
+  const InventoryResult basic = take_inventory(blocks_of(plot.cloud), basic_inventory());
+  EXPECT_LT(basic.trees.size(), full.trees.size());
+  for (const Tree& tree : basic.trees)
+    EXPECT_GE(tree.dbh_m, 0.05);
+}
+
+}  // namespace
+}  // namespace understory
