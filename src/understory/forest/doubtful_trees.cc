@@ -50,7 +50,9 @@ std::vector<StandingStem> standing_stems(const InventoryResult& result,
   std::vector<StandingStem> stems;
   for (std::size_t i = 0; i < result.stems.size(); ++i) {
     const StemFit& stem = result.stems[i];
-    stems.push_back({stem.centre, stem.radius_m, has_weak_diameter(result.trees[i]), seen[i]});
+    // Noise as wide as a thin stem within foliage stays, from wherever it is seen.
+    const bool weak = has_weak_diameter(result.trees[i]) && !stem.in_foliage;
+    stems.push_back({stem.centre, stem.radius_m, weak, seen[i]});
   }
   return stems;
 }

@@ -27,6 +27,11 @@ TEST(YoungTrees, GreenToTheGroundAreListedByAFullInventory) {
     EXPECT_GT(tree->dbh_sd_m, 0.01);
     EXPECT_NEAR(tree->height_m, 3.2, 0.2);
   }
+  // Another view would hardly tell more of a stem that is as thin as the noise.
+  for (const LookAgain& place : full.look_again) {
+    for (const int id : place.trees)
+      EXPECT_FALSE(full.stems.at(static_cast<std::size_t>(id) - 1).in_foliage) << id;
+  }
   // A map's own list begins at 5 cm.
   const InventoryResult basic = take_inventory(blocks_of(plot.cloud), basic_inventory());
   EXPECT_LT(basic.trees.size(), full.trees.size());

@@ -65,6 +65,7 @@ std::int32_t millimetres(float metres) {
 
 // A tree as the doubt needs it, before its height is known.
 double doubt_of_stem(const StemFit& stem) {
+  if (stem.in_foliage) return 0.0;  // there are many, and a sheet shows foliage
   Tree tree;
   tree.dbh_m = 2.0 * stem.radius_m;
   tree.dbh_sd_m = 2.0 * std::sqrt(std::max(0.0, stem.covariance(2, 2)));
