@@ -265,8 +265,10 @@ void remark(const StemHarvest& gathered, const InventoryConfig& config, Inventor
 }  // namespace
 
 StemDetectorConfig search_of(StemDetectorConfig config, InventoryExtent extent) {
-  if (config.min_dbh_m == 0.0)
-    config.min_dbh_m = extent == InventoryExtent::kFull ? kThinnest : kThinnestBasic;
+  if (config.min_dbh_m == 0.0) {
+    config.min_dbh_m = kThinnestBasic;
+    if (extent == InventoryExtent::kFull) config.thin_dbh_m = kThinnest;
+  }
   config.min_dbh_m = std::max(config.min_dbh_m, kThinnest);
   return config;
 }

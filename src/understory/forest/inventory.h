@@ -39,7 +39,8 @@ enum class InventoryExtent { kBasic, kFull };
   config.min_dbh_m = 0.0;
   return config;
 }
-// The same with the diameter that it stands for: 2 cm in a full inventory, else 5 cm.
+// The same with the diameter that it stands for: 5 cm, and thinner stems down to 2 cm in a full
+// inventory. So this has the trees of a basic one, and thinner ones.
 [[nodiscard]] StemDetectorConfig search_of(StemDetectorConfig config, InventoryExtent extent);
 
 // Settings of `understory inventory` and of the trees of a map.

@@ -74,7 +74,7 @@ class TestPlot {
       const double turn = random_.uniform(0.0, 2.0 * M_PI);
       const bool on_stem = i % 8 == 0;
       const double crown = 0.7 * (1.0 - h / height) + 0.1;
-      const double r = on_stem ? 0.5 * dbh : crown * std::sqrt(random_.uniform());
+      const double r = on_stem ? 0.5 * dbh : crown * random_.uniform();
       const double noise = on_stem ? 0.01 : 0.0;
       cloud.emplace_back(x + r * std::cos(turn) + random_.normal(0.0, noise),
                          y + r * std::sin(turn) + random_.normal(0.0, noise), ground(x, y) + h);

@@ -43,7 +43,9 @@ class Squares {
   }
 
  private:
-  [[nodiscard]] int row(double value) const { return static_cast<int>(std::floor(value / edge_m_)); }
+  [[nodiscard]] int row(double value) const {
+    return static_cast<int>(std::floor(value / edge_m_));
+  }
   static std::int64_t key_of(int row, int column) {
     return (static_cast<std::int64_t>(row) << 32) + column;
   }

@@ -20,8 +20,8 @@ namespace understory {
                                                         const StemSearchArea& where,
                                                         const ProgressSink& progress);
 
-// Whether foliage surrounds a column: `near` has points to nearly all sides of it. A wall, a post or
-// the side of a vehicle has none behind it.
+// Whether foliage surrounds a column: `near` has points to nearly all sides of it. A wall, a post
+// or the side of a vehicle has none behind it.
 [[nodiscard]] bool stands_in_foliage(const std::vector<SlicePoint>& near, const StemFit& column);
 
 }  // namespace understory

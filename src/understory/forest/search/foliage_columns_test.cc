@@ -89,8 +89,8 @@ TEST(FoliageColumns, FoliageStandsToAllSides) {
   EXPECT_TRUE(stands_in_foliage(foliage, column));
   std::vector<SlicePoint> wall;
   for (int i = 0; i < 3000; ++i)
-    wall.push_back(point_at(random.uniform(-0.6, 0.6), random.normal(0.0, 0.02),
-                            random.uniform(0.5, 3.0)));
+    wall.push_back(
+        point_at(random.uniform(-0.6, 0.6), random.normal(0.0, 0.02), random.uniform(0.5, 3.0)));
   EXPECT_FALSE(stands_in_foliage(wall, column));
 }
 

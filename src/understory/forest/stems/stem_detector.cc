@@ -232,33 +232,6 @@ void mark_explained(const StemFit& stem, const PointIndex& index,
   });
 }
 
-}  // namespace
-
-void describe(ConfigTable& table, StemDetectorConfig& config) {
-  table.add("lowest_m", config.lowest_m, {0.1, 5.0}, "m",
-            "lowest height above the ground at which stems are searched");
-  table.add("highest_m", config.highest_m, {1.5, 20.0}, "m",
-            "highest height above the ground at which stems are searched");
-  table.add("slice_m", config.slice_m, {0.05, 1.0}, "m", "thickness of a slice");
-  table.add("thin_m", config.thin_m, {0.0, 0.1}, "m",
-            "one point is kept in each cube of this size");
-  table.add(
-      "min_dbh_m", config.min_dbh_m, {0.0, 1.0}, "m",
-      "smallest diameter that is searched, 0.02 at least; 0: 0.02 in a full inventory, 0.05 in "
-      "a basic one and in a slice");
-  table.add("max_dbh_m", config.max_dbh_m, {0.1, 5.0}, "m", "largest diameter that is searched");
-  table.add("min_returns", config.min_returns, {5, 100'000}, "",
-            "fewest returns on the surface of a stem");
-  table.add("min_arc_deg", config.min_arc_deg, {20.0, 360.0}, "deg",
-            "smallest part of the circumference that must be seen");
-  table.add("min_slices", config.min_slices, {2, 50}, "",
-            "fewest slices in which the surface must be seen");
-  table.add("max_lean_deg", config.max_lean_deg, {0.0, 60.0}, "deg",
-            "largest lean of a stem from the vertical");
-}
-
-namespace {
-
 Cut cut_of(StemCut cut, const StemDetectorConfig& config) {
   if (cut == StemCut::kThin) return {config.slice_m, config.min_slices, kThinReach, kThinBand};
   return {kThickSlices * config.slice_m, kLeastThickSlices, kThickReach, kThickBand};
@@ -321,28 +294,30 @@ std::vector<SlicePoint> unexplained_near(const Search& search, const StemFit& st
   return near;
 }
 
-// Fits that are stems by themselves.
-std::vector<StemFitResult> fit_starts(const Search& search, const std::vector<StemFit>& starts,
-                                      const Cut& cut, const StemDetectorConfig& config,
-                                      const ProgressSink& progress) {
+// A fit that is a stem by itself, or has not converged.
+StemFitResult fit_start(const Search& search, const StemFit& start, const Cut& cut,
+                        const StemDetectorConfig& config) {
+  const std::vector<SlicePoint> near = unexplained_near(search, start, config);
+  StemFitResult fit = fit_stem(near, start, config);
+  if (is_stem(fit, cut, config)) {
+    fit = refine_stem(near, fit, config);
+    if (is_stem_still(fit, cut, config) && is_tree(fit.stem, search.index, search.points, config))
+      return fit;
+  }
+  fit.converged = false;
+  return fit;
+}
+
+// Fits of all starts by `fit`, without those that are no stems.
+template <typename Fit>
+std::vector<StemFitResult> fit_all(const std::vector<StemFit>& starts, const ProgressSink& progress,
+                                   const Fit& fit) {
   std::vector<StemFitResult> fits(starts.size());
-  std::vector<char> accepted(starts.size(), 0);
   parallel_for(starts.size(), 1, [&](std::size_t i) {
     progress.poll();
-    const std::vector<SlicePoint> near = unexplained_near(search, starts[i], config);
-    fits[i] = fit_stem(near, starts[i], config);
-    accepted[i] = is_stem(fits[i], cut, config) ? 1 : 0;
-    if (accepted[i] != 0) {
-      fits[i] = refine_stem(near, fits[i], config);
-      accepted[i] = is_stem_still(fits[i], cut, config) &&
-                    is_tree(fits[i].stem, search.index, search.points, config);
-    }
+    fits[i] = fit(starts[i]);
   });
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < fits.size(); ++i) {
-    if (accepted[i] != 0) fits[kept++] = fits[i];
-  }
-  fits.resize(kept);
+  std::erase_if(fits, [](const StemFitResult& result) { return !result.converged; });
   return fits;
 }
 
@@ -371,20 +346,40 @@ void add_unclaimed(const std::vector<StemFitResult>& fits, const StemDetectorCon
   }
 }
 
+// A fit to a column within foliage that is a stem, or has not converged.
+StemFitResult fit_column(const Search& search, const StemFit& column,
+                         const StemDetectorConfig& config) {
+  const std::vector<SlicePoint> near = unexplained_near(search, column, config);
+  StemFitResult fit = fit_in_foliage(near, column, config);
+  fit.stem.in_foliage = true;
+  fit.converged = is_foliage_stem(fit, near, search, config);
+  return fit;
+}
+
 void add_foliage_stems(const StemDetectorConfig& config, const StemSearchArea& where,
                        const ProgressSink& progress, Search& search) {
   const std::vector<StemFit> columns =
       find_foliage_columns(search.points, search.explained, config, where, progress);
-  std::vector<StemFitResult> fits(columns.size());
-  parallel_for(columns.size(), 1, [&](std::size_t i) {
-    progress.poll();
-    const std::vector<SlicePoint> near = unexplained_near(search, columns[i], config);
-    fits[i] = fit_in_foliage(near, columns[i], config);
-    fits[i].stem.in_foliage = true;
-    fits[i].converged = is_foliage_stem(fits[i], near, search, config);
+  const auto fit = [&](const StemFit& column) { return fit_column(search, column, config); };
+  add_unclaimed(fit_all(columns, progress, fit), config, search);
+}
+
+// Stems that are thinner than the others, within foliage or not.
+void add_thinnest_stems(const StemDetectorConfig& config, const StemSearchArea& where,
+                        const ProgressSink& progress, Search& search) {
+  StemDetectorConfig thin = config;
+  thin.min_dbh_m = config.thin_dbh_m;
+  const Cut cut{config.slice_m, config.min_slices, kThinReach, kThinBand};
+  const std::vector<StemFit> columns =
+      find_foliage_columns(search.points, search.explained, thin, where, progress);
+  std::vector<StemFitResult> fits = fit_all(columns, progress, [&](const StemFit& column) {
+    const StemFitResult fit = fit_start(search, column, cut, thin);
+    return fit.converged ? fit : fit_column(search, column, thin);
   });
-  std::erase_if(fits, [](const StemFitResult& fit) { return !fit.converged; });
-  add_unclaimed(fits, config, search);
+  // What is not thinner was not accepted before.
+  std::erase_if(
+      fits, [&](const StemFitResult& fit) { return 2.0 * fit.stem.radius_m >= config.min_dbh_m; });
+  add_unclaimed(fits, thin, search);
 }
 
 void add_stems(const Cut& cut, const StemDetectorConfig& config, const StemSearchArea& where,
@@ -394,7 +389,9 @@ void add_stems(const Cut& cut, const StemDetectorConfig& config, const StemSearc
   std::vector<StemFit> starts = link_rings(rings, cut.min_slices, config.max_lean_deg);
   const GroundArea fitted = where.area.grown(kFitsBeyond);
   std::erase_if(starts, [&](const StemFit& start) { return !fitted.contains(start.centre); });
-  std::vector<StemFitResult> fits = fit_starts(search, starts, cut, config, progress);
+  std::vector<StemFitResult> fits = fit_all(starts, progress, [&](const StemFit& start) {
+    return fit_start(search, start, cut, config);
+  });
   sort_by_support(fits);
   add_unclaimed(fits, config, search);
 }
@@ -419,7 +416,9 @@ std::vector<StemFit> detect_stems_in_cut(StemCut cut, std::vector<SlicePoint>& p
   Search search(points);
   for (const StemFit& stem : known)
     search.know(stem);
-  if (cut == StemCut::kFoliage)
+  if (cut == StemCut::kThinnest)
+    add_thinnest_stems(config, where, progress, search);
+  else if (cut == StemCut::kFoliage)
     add_foliage_stems(config, where, progress, search);
   else
     add_stems(cut_of(cut, config), config, where, progress, search);

@@ -27,6 +27,9 @@ struct StemDetectorConfig {
   double slice_m = 0.25;   // thickness of a slice
   double thin_m = 0.015;   // one point per cube of this size
   double min_dbh_m = 0.05;
+  // Thinner stems are searched in the end, among what no other stem explains; 0: they are not. No
+  // setting: see search_of.
+  double thin_dbh_m = 0.0;
   double max_dbh_m = 1.2;
   int min_returns = 25;       // of the cloud on the stem's surface
   double min_arc_deg = 60.0;  // of the circle that points cover, over all slices
@@ -85,11 +88,11 @@ struct StemSearchArea {
                                                 const StemSearchArea& where = {},
                                                 const ProgressSink& progress = {});
 
-// The two searches of detect_stems, one after the other. The first looks at thin slices, the second
-// at thick ones, among the points that no stem of the first explains. Of a cloud in tiles the
-// second has to know those of the first beyond the tile. Gives the stems with the centre in the
-// area.
-enum class StemCut { kThin, kThick, kFoliage };
+// The searches of detect_stems, one after the other: thin slices, thick ones, columns within
+// foliage; and a last one for columns thinner than min_dbh_m, which has to come after that for
+// hidden stems. Each looks at the points that no stem of those before explains. Of a cloud in tiles
+// it has to know those beyond the tile. Gives the stems with the centre in the area.
+enum class StemCut { kThin, kThick, kFoliage, kThinnest };
 [[nodiscard]] std::vector<StemFit> detect_stems_in_cut(StemCut cut, std::vector<SlicePoint>& points,
                                                        const std::vector<StemFit>& known,
                                                        const StemDetectorConfig& config,

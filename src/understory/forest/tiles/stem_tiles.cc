@@ -81,13 +81,15 @@ class StemTiles {
                                 progress_),
             harvest.stems);
       }
+      if (config_.thin_dbh_m > 0.0) {
+        add(detect_stems_in_cut(StemCut::kThinnest, harvest.slices, harvest.stems, config_,
+                                {{}, origin_.head<2>()}, progress_),
+            harvest.stems);
+      }
       return harvest;
     }
-    for (const StemCut cut : {StemCut::kThin, StemCut::kThick, StemCut::kFoliage}) {
-      search(harvest.stems, 0.0, [&](Nearby nearby, const StemSearchArea& where) {
-        return detect_stems_in_cut(cut, nearby.slices, nearby.stems, config_, where, progress_);
-      });
-    }
+    for (const StemCut cut : {StemCut::kThin, StemCut::kThick, StemCut::kFoliage})
+      search_cut(cut, harvest.stems);
     for (const HeightRange& heights : hidden_stem_heights(config_)) {
       search(harvest.stems, shadow_reach_m(), [&](Nearby nearby, const StemSearchArea& where) {
         const std::vector<SlicePoint> above = points_in(above_, cloud_, origin_, nearby.around);
@@ -96,6 +98,7 @@ class StemTiles {
         return detect_hidden_stems(heights, points, nearby.stems, config_, where, progress_);
       });
     }
+    if (config_.thin_dbh_m > 0.0) search_cut(StemCut::kThinnest, harvest.stems);
     add_shown(harvest.slices);
     harvest.thinned = std::move(slices_);
     return harvest;
@@ -167,6 +170,12 @@ class StemTiles {
     });
     for (std::vector<StemFit>& part : found)
       add(std::move(part), stems);
+  }
+
+  void search_cut(StemCut cut, std::vector<StemFit>& stems) {
+    search(stems, 0.0, [&](Nearby nearby, const StemSearchArea& where) {
+      return detect_stems_in_cut(cut, nearby.slices, nearby.stems, config_, where, progress_);
+    });
   }
 
   static void add(std::vector<StemFit> found, std::vector<StemFit>& stems) {
