@@ -7,9 +7,9 @@
 #include <numeric>
 #include <utility>
 
+#include "understory/forest/cell_index.h"
 #include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/arc_bins.h"
-#include "understory/forest/stems/cell_index.h"
 #include "understory/forest/stems/point_groups.h"
 #include "understory/geometry/symmetric_solver.h"
 #include "understory/util/parallel.h"

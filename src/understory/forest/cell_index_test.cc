@@ -1,4 +1,4 @@
-#include "understory/forest/stems/cell_index.h"
+#include "understory/forest/cell_index.h"
 
 #include <gtest/gtest.h>
 
