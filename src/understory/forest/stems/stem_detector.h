@@ -89,9 +89,9 @@ struct StemSearchArea {
                                                 const ProgressSink& progress = {});
 
 // The searches of detect_stems, one after the other: thin slices, thick ones, columns within
-// foliage; and a last one for columns thinner than min_dbh_m, which has to come after that for
-// hidden stems. Each looks at the points that no stem of those before explains. Of a cloud in tiles
-// it has to know those beyond the tile. Gives the stems with the centre in the area.
+// foliage. The last one, for columns thinner than min_dbh_m, is to come after that for hidden
+// stems. Each looks at the points that no stem of those before explains. Of a cloud in tiles it has
+// to know those beyond the tile. Gives the stems with the centre in the area.
 enum class StemCut { kThin, kThick, kFoliage, kThinnest };
 [[nodiscard]] std::vector<StemFit> detect_stems_in_cut(StemCut cut, std::vector<SlicePoint>& points,
                                                        const std::vector<StemFit>& known,
