@@ -25,14 +25,14 @@ def ring(number, recall, expected=10):
 
 def road(site, number):
     gnss = {"gnss_fixes_mean_m": number, "gnss_fit_rms_m": number, "gnss_along_rms_m": number}
-    return {"site": site, "way_m": 175.0, "map_kb": number, "kb": 1000.0 * number, "plane_cm": number, "space_cm": number,
+    return {"site": site, "way_m": 175.0, "map_kb": number, "plane_cm": number, "space_cm": number,
             "segment": number, "gnss": {"ours": gnss, "truth": gnss}, "height_cm": [number, number], "range_m": 20,
             "terrain": {"terrain_rms_before_m": number, "terrain_rms_m": number}, "memory_mb": number, "cpu_ms": number,
             "rings": [ring(0, 0.01 * number), ring(1, 0.0, 0)]}
 
 
 def by_stems(site, number):
-    return road(site, number) | {"views": 7, "axis_deg": 1.7, "before_cm": [number, number], "share": number,
+    return road(site, number) | {"views": 7, "kb": 1000.0 * number, "axis_deg": 1.7, "before_cm": [number, number], "share": number,
                                  "sharp": [(number, number, number, number)] * 3}
 
 
@@ -48,7 +48,7 @@ def columns():
     check(len({line.count("|") for line in wide}) == 1, "rows of the first table are equally wide")
     told = rows["the same in plane over the longest segments, %"]
     check(told == ["11.00", "12.00", "0.41 to 0.5", "21.00", "22.00", "0.5"], f"of both ways: {told}")
-    check(rows["cloud that these stems are found in, kB per 100 m"] == ["", "", "", "31", "32", "63,000"], "clouds")
+    check(rows["cloud that stems are found in, kB per 100 m"] == ["", "", "", "31", "32", "63,000"], "clouds")
     check(rows["vertical angular noise of stems, degrees"] == ["1.7", "1.7", "2.0", "", "", ""], "noise of axes")
     check(rows["a pair"] == ["3, 4", "50.0 %", "60.0 %", "70.0 %"], f"consistency: {rows['a pair']}")
     check(rows["lieksa2 by all points: standing trees found, %"] == ["22.0", ""], "a ring without trees is empty")
