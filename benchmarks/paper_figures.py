@@ -6,7 +6,8 @@
   ./run accuracy --figures -o DIR --seconds 90  the first 90 s of each
   ./run accuracy --figures -o DIR --only P2-F4,P4-F21
   ./run accuracy --figures --list               which figures there are, and what each needs
-  ./run accuracy --figures -o DIR --write       also puts page and pictures into docs/method and docs/pictures
+  ./run accuracy --figures -o DIR --write       also puts page and pictures into docs/method and docs/pictures; figures
+                                                that are not in DIR stay there as they are
 
 DIR then holds index.html (all figures with their words), and of each figure KEY.png, KEY.csv (the values that are
 drawn) and KEY.json (its words). Runs lie in DIR/runs. A finished run is not made again, so a stopped command goes on
@@ -101,7 +102,8 @@ def write_docs(folder, entries):
     for entry in entries:  # of few colours: a third of the bytes, and no difference to the eye
         picture = Image.open(folder / entry.picture).convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE)
         picture.save(PICTURES / entry.picture, optimize=True)
-    PAGE.write_text(markdown(entries, f"../pictures/{PICTURES.name}"))
+    old = PAGE.read_text() if PAGE.exists() else ""
+    PAGE.write_text(markdown(entries, f"../pictures/{PICTURES.name}", all_figures(), old))
     say(f"written: {PAGE}")
 
 

@@ -10,8 +10,10 @@
   ./run bench stems --rules         P0's pairs or those chosen by Delaunay stars, the same roads
   ./run bench stems --search        where ICP converges (a picture), and what Go-ICP's search costs
   ./run bench stems --table --runs FOLDER [--site-seed N] [--sites lieksa1,lieksa2]
-                                    P1's table 1 over whole simulated sites; runs that are in the
-                                    folder are not made again (each takes minutes)
+                                    P1's table 1 over whole simulated sites, by stems alone and by
+                                    LeGO-LOAM's method; runs that are in the folder are not made
+                                    again (each takes minutes), and figures 9 and 10 of P1 use the
+                                    same: ./run accuracy --figures -o FOLDER --seed N --only P1-F9
   ./run bench stems --write         puts the tables into docs/method/sparse-experiments.md
 
 The roads are those of tests/stems/strip_roads.py: three, 22.5 m apart. Truth is for the
@@ -402,6 +404,7 @@ def main():
     parser.add_argument("--runs", help="folder of the runs of --table")
     parser.add_argument("--site-seed", type=int, default=22)
     parser.add_argument("--sites", default="lieksa1,lieksa2,lieksa3")
+    parser.add_argument("--seconds", type=float, help="with --table: only the first so many of each site")
     parser.add_argument("--rows", help="file that keeps what was measured; its seeds are not "
                         "measured again")
     parser.add_argument("--write", action="store_true", help="into docs/method/sparse-experiments.md")
@@ -411,7 +414,7 @@ def main():
     if options.table:
         with tempfile.TemporaryDirectory() as scratch:
             tables["strip roads"] = table_page(options.sites.split(","), options.site_seed,
-                                               options.runs or scratch)
+                                               options.runs or scratch, options.seconds)
     everything = not (options.table or options.methods or options.real or options.orders
                       or options.rules or options.search or options.spoilt)
     if everything or options.spoilt:

@@ -1,14 +1,18 @@
-"""Table 1 of P1 for simulated strip roads: `./run bench stems --table`. The truth places the runs beside each
-other and judges them; the program never sees it before."""
+"""Table 1 of P1 for simulated strip roads: `./run bench stems --table`. Each road is mapped by stems alone (sSLAM) and by
+all points with LeGO-LOAM's method (LLOAM). The truth places the runs beside each other and judges them; the program never
+sees it before."""
 
-import json
 import math
 import statistics
 from pathlib import Path
 
-from program import DONE, UNTRUSTED, simulated, understory, understory_json
+from figures.road_jobs import road_jobs_of
+from figures.runs import Runs
+from program import Failed, understory_json, version
 
 RING_M, REACH_M = 5, 40
+ANTENNA_M = (0, 0.3, 3.1)  # gnss.mount_m of the sites
+SHORT = {"translation_plane_percent": math.nan}  # of a way that has no segment
 FOUND = 0.85  # of the trees of a ring that still counts as mapped
 
 
@@ -35,15 +39,6 @@ def height_sd_m(run, truth):
     return statistics.pstdev(ours[t][2] - true[t][2] for t in ours.keys() & true.keys())
 
 
-def mapped_run(site, seed, folder):
-    """Maps a whole site by stems alone, or takes the run that is there."""
-    run = folder / f"{site}_{seed}"
-    if not (run / "run.json").exists():
-        understory("map", simulated(site, seed=seed), "-o", run, "--front-end", "sparse", "--threads", 1,
-                   accept=(DONE, UNTRUSTED))
-    return run
-
-
 def mapping_range_m(rings):
     reach = 0
     for ring in rings:
@@ -53,43 +48,57 @@ def mapping_range_m(rings):
     return reach
 
 
-def measure_road(site, seed, folder):
-    run = mapped_run(site, seed, folder)
-    truth = run.with_name(run.name + ".truth")
-    told = json.loads((run / "run.json").read_text())
-    path = understory_json("evaluate", run, truth, "--align", "se3")
-    fixes = run / "gnss.csv"
+def kb_per_100_m(file, way_m):
+    return file.stat().st_size / 1e3 / way_m * 100
+
+
+def measure_road(run, folder):
+    """The figures that both ways of mapping a road have: by stems alone, and by all points."""
+    site, truth, told = run.job.recording.site, run.truth, run.told
+    path = understory_json("evaluate", run.folder, truth, "--align", "se3")
     gnss = {}
-    for name, moved in (("ours", run), ("truth", truth)):
+    for name, moved in (("ours", run.folder), ("truth", truth)):
         gnss[name] = understory_json(
-            "georeference", moved, "--method", "gnss-path", "--gnss",
-            fixes if fixes.exists() else simulated(site, seed=seed), "-o", folder / f"{run.name}_gnss_{name}",
-            "--overwrite", "--antenna-m", 0, 0.3, 3.1)
-    level = folder / f"{run.name}_level"
-    terrain = understory_json("georeference", run, "--method", "terrain", "--dem", truth / "dtm.tif",
-                              "--start", *start_of(run, truth), "-o", level, "--overwrite")
+            "georeference", moved, "--method", "gnss-path", "--gnss", run.folder / "gnss.csv", "-o",
+            folder / f"{run.job.name}_gnss_{name}", "--overwrite", "--antenna-m", *ANTENNA_M)
+    level = folder / f"{run.job.name}_level"
+    terrain = understory_json("georeference", run.folder, "--method", "terrain", "--dem", truth / "dtm.tif",
+                              "--start", *start_of(run.folder, truth), "-o", level, "--overwrite")
     rings = understory_json("evaluate", "trees", level, truth, "--matching", "nearest", "--truth-returns", truth, "--path", truth,
                             "--bin-m", RING_M, "--reach-m", REACH_M)["by_distance"]
-    sharp = understory_json("evaluate", "map", run / "stems.csv.gz", run)
-    true = understory_json("evaluate", "map", run / "stems.csv.gz", truth)
-    chained = understory_json("evaluate", "map", run / "stems.csv.gz", run / "odometry.tum")
-    before = understory_json("evaluate", run / "odometry.tum", truth, "--align", "se3")
-    way = told["quality"]["path_length_m"]
+    way = path["length_m"]  # the true one, the same for both ways of mapping
     return {
-        "site": site, "seed": seed, "level": level, "rings": rings, "way_m": way,
-        "kb": (run / "stems.csv.gz").stat().st_size / 1e3 / way * 100,
-        "map_kb": (run / "trees.csv").stat().st_size / 1e3 / way * 100,
+        "site": site, "way": run.job.way, "level": level, "rings": rings, "way_m": way, "scans": told["scans"],
+        "map_kb": kb_per_100_m(run.folder / "trees.csv", way),
         "plane_cm": 100 * path["ape_plane_rmse_m"], "space_cm": 100 * path["ape_rmse_m"],
-        "segment": max(path["segments"], key=lambda s: s["length_m"])["translation_plane_percent"],
+        "segment": max(path["segments"], key=lambda s: s["length_m"], default=SHORT)["translation_plane_percent"],
         "gnss": gnss, "terrain": terrain,
-        "height_cm": [100 * height_sd_m(folder_, truth) for folder_ in (run, level)],
-        "before_cm": [100 * before["ape_plane_rmse_m"], 100 * before["ape_rmse_m"]],
-        "axis_deg": told["quality"]["axis_noise_deg"], "range_m": mapping_range_m(rings),
-        "sharp": [(100 * m["cluster_noise_m"], 100 * m["registration_noise_m"], 1e3 * m["beta"], m["box_dimension"])
-                  for m in (chained, sharp, true)],
-        "share": 100 * told["quality"]["corrections_share"],
-        "memory_mb": told["peak_memory_mb"], "views": told["counts"]["views"],
+        "height_cm": [100 * height_sd_m(folder_, truth) for folder_ in (run.folder, level)],
+        "range_m": mapping_range_m(rings), "memory_mb": told["peak_memory_mb"],
+        "cpu_ms": told["stages"]["scan"]["cpu_ms"]["mean"],
     }
+
+
+def measure_stems(run, folder):
+    """A road that was mapped by stems alone; adds what tells how sharp its map is."""
+    sharp = [understory_json("evaluate", "map", run.folder / "stems.csv.gz", path)
+             for path in (run.folder / "odometry.tum", run.folder, run.truth)]
+    before = understory_json("evaluate", run.folder / "odometry.tum", run.truth, "--align", "se3")
+    road = measure_road(run, folder)
+    return road | {
+        "views": run.told["counts"]["views"], "axis_deg": run.told["quality"]["axis_noise_deg"],
+        "kb": kb_per_100_m(run.folder / "stems.csv.gz", road["way_m"]),
+        "before_cm": [100 * before["ape_plane_rmse_m"], 100 * before["ape_rmse_m"]],
+        "sharp": [(100 * m["cluster_noise_m"], 100 * m["registration_noise_m"], 1e3 * m["beta"], m["box_dimension"])
+                  for m in sharp],
+        "share": 100 * run.told["quality"]["corrections_share"],
+    }
+
+
+def measure_points(run, folder):
+    """A road whose map of all points LeGO-LOAM's method made. The stems of this map are the trees of the run."""
+    road = measure_road(run, folder)
+    return road | {"cloud_kb": kb_per_100_m(run.folder / "map.laz", road["way_m"])}
 
 
 def between(a, b):
@@ -98,51 +107,92 @@ def between(a, b):
     return told["consistency"]
 
 
-def table_page(sites, seed, folder):
-    folder = Path(folder)
-    roads = [measure_road(site, seed, folder) for site in sites]
-    head = f"Seed {seed}; whole sites"
-    lines = [head, "", "| | " + " | ".join(r["site"] for r in roads) + " | P1 |",
-             "|---|" + "---|" * (len(roads) + 1)]
+def rows_of_roads():
+    """Name, cell of a road by stems, of one by all points (None: it has none), and what P1 has of both."""
+    both = lambda cell: (cell, cell)
+    yield ("way, m", *both(lambda r: f"{r['way_m']:.0f}"), "", "")
+    yield "views kept", lambda r: f"{r['views']}", None, "", ""
+    yield "stems of all views, kB per 100 m", lambda r: f"{r['kb']:,.0f}", None, "450", ""
+    yield "cloud that stems are found in, kB per 100 m", None, lambda r: f"{r['cloud_kb']:,.0f}", "", "63,000"
+    yield "tree map, kB per 100 m", *both(lambda r: f"{r['map_kb']:.1f}"), "", ""
+    yield ("path in the plane, cm: before / after correction", lambda r: f"{r['before_cm'][0]:.1f} / {r['plane_cm']:.1f}",
+           lambda r: f"{r['plane_cm']:.1f}", "", "")
+    yield ("path in space, cm", lambda r: f"{r['before_cm'][1]:.1f} / {r['space_cm']:.1f}",
+           lambda r: f"{r['space_cm']:.1f}", "", "")
+    yield "the same in plane over the longest segments, %", *both(lambda r: f"{r['segment']:.2f}"), "0.41 to 0.5", "0.5"
+    yield ("fixes off the path, mean, m (off the true path)", *both(lambda r: "{:.2f} ({:.2f})".format(
+        *(r["gnss"][k]["gnss_fixes_mean_m"] for k in ("ours", "truth")))), "0.8", "0.8")
+    yield ("fit to GNSS, root of (6), m (true path)", *both(lambda r: "{:.2f} ({:.2f})".format(
+        *(r["gnss"][k]["gnss_fit_rms_m"] for k in ("ours", "truth")))), "", "")
+    yield ("GNSS along the way by time, m (true path)", *both(lambda r: "{:.2f} ({:.2f})".format(
+        *(r["gnss"][k]["gnss_along_rms_m"] for k in ("ours", "truth")))), "0.41", "0.84")
+    yield ("feet above the terrain model, m: before / after levelling", *both(lambda r: "{:.2f} / {:.2f}".format(
+        r["terrain"]["terrain_rms_before_m"], r["terrain"]["terrain_rms_m"])), "0.94", "0.37")
+    yield "height of the path, cm, the same", *both(lambda r: "{:.0f} / {:.0f}".format(*r["height_cm"])), "", ""
+    yield "vertical angular noise of stems, degrees", lambda r: f"{r['axis_deg']:.1f}", None, "2.0", ""
+    yield f"mapping range ({100 * FOUND:.0f} % found), m", *both(lambda r: f"{r['range_m']:g}"), "20", "20"
+    for k, (name, digits, paper) in enumerate((("e_C, P0 (33), cm", 1, "15 (P0)"), ("e_C of single trees, cm", 1, ""),
+                                               ("beta, per mille", 2, ""), ("d", 3, ""))):
+        yield (f"{name}: before / after correction / with true poses",
+               lambda r, k=k, digits=digits: " / ".join(f"{m[k]:.{digits}f}" for m in r["sharp"]), None, paper, "")
+    yield "corrections, % of the views", lambda r: f"{r['share']:.1f}", None, "", ""
+    yield "processor time a scan, ms", *both(lambda r: f"{r['cpu_ms']:.1f}"), "", ""
+    yield "peak memory, MB", *both(lambda r: f"{r['memory_mb']:.0f}"), "", ""
 
-    def row(name, cell, paper=""):
-        lines.append(f"| {name} | " + " | ".join(cell(r) for r in roads) + f" | {paper} |")
 
-    row("way, views kept", lambda r: f"{r['way_m']:.0f} m, {r['views']}")
-    row("stems of all views, kB per 100 m", lambda r: f"{r['kb']:.0f}", "450")
-    row("tree map, kB per 100 m", lambda r: f"{r['map_kb']:.1f}")
-    row("path in the plane, cm: before / after correction",
-        lambda r: f"{r['before_cm'][0]:.1f} / {r['plane_cm']:.1f}")
-    row("path in space, cm", lambda r: f"{r['before_cm'][1]:.1f} / {r['space_cm']:.1f}")
-    row("the same in plane over the longest segments, %", lambda r: f"{r['segment']:.2f}", "0.41 to 0.5")
-    row("fixes off the path, mean, m (off the true path)", lambda r: "{:.2f} ({:.2f})".format(
-        *(r["gnss"][k]["gnss_fixes_mean_m"] for k in ("ours", "truth"))), "0.8")
-    row("fit to GNSS, root of (6), m (true path)", lambda r: "{:.2f} ({:.2f})".format(
-        *(r["gnss"][k]["gnss_fit_rms_m"] for k in ("ours", "truth"))))
-    row("GNSS along the way by time, m (true path)", lambda r: "{:.2f} ({:.2f})".format(
-        *(r["gnss"][k]["gnss_along_rms_m"] for k in ("ours", "truth"))), "0.41")
-    row("feet above the terrain model, m: before / after levelling", lambda r: "{:.2f} / {:.2f}".format(
-        r["terrain"]["terrain_rms_before_m"], r["terrain"]["terrain_rms_m"]), "0.94")
-    row("height of the path, cm, the same", lambda r: "{:.0f} / {:.0f}".format(*r["height_cm"]))
-    row("vertical angular noise of stems, degrees", lambda r: f"{r['axis_deg']:.1f}", "2.0")
-    row(f"mapping range ({100 * FOUND:.0f} % found), m", lambda r: f"{r['range_m']}", "20")
-    for k, (name, digits, paper) in enumerate((("e_C, P0 (33), cm", 1, "15"), ("e_C of single trees, cm", 1, ""), ("beta, per mille", 2, ""), ("d", 3, ""))):
-        row(f"{name}: before / after correction / with true poses",
-            lambda r: " / ".join(f"{m[k]:.{digits}f}" for m in r["sharp"]), paper)
-    row("corrections, % of the views", lambda r: f"{r['share']:.1f}")
-    row("peak memory, the simulator's stand included, MB", lambda r: f"{r['memory_mb']:.0f}")
-    lines += ["", "| roads | trees within 20 m of both | the same, as placed | after one motion | in parts |",
-              "|---|---|---|---|---|", "| P1 | | | 79 % | 85 % |"]
-    for a, b in zip(roads, roads[1:]):
-        c = between(a, b)
-        lines.append(f"| {a['site']}, {b['site']} | {c['trees_a']}, {c['trees_b']} | {100 * c['as_placed']:.1f} % | "
-                     f"{100 * c['moved']:.1f} % | {100 * c['in_parts']:.1f} % |")
-    lines += ["", "| distance from the way, m | " + " | ".join(
+def consistencies(roads, points):
+    """Name and consistency of each pair of maps: neighbouring roads by one way, and one road by both."""
+    pairs = [(f"{a['site']}, {b['site']}, {name}", a, b) for name, group in (("by stems", roads), ("by all points", points))
+             for a, b in zip(group, group[1:])]
+    pairs += [(f"{a['site']}, by stems and by all points", a, b) for a, b in zip(roads, points)]
+    return [(name, between(a, b)) for name, a, b in pairs]
+
+
+def consistency_table(pairs):
+    lines = ["| trees of | within 20 m of both | the same, as placed | after one motion | in parts |",
+             "|---|---|---|---|---|", "| P1, sSLAM | | | 79 % | 85 % |", "| P1, LLOAM | | | 75 % | 77 % |"]
+    return lines + [f"| {name} | {c['trees_a']}, {c['trees_b']} | {100 * c['as_placed']:.1f} % | "
+                    f"{100 * c['moved']:.1f} % | {100 * c['in_parts']:.1f} % |" for name, c in pairs]
+
+
+def ring_table(roads, points):
+    lines = ["| distance from the way, m | " + " | ".join(
         f"{ring['from_m']:g}-{ring['to_m']:g}" for ring in roads[0]["rings"]) + " |",
         "|---|" + "---|" * len(roads[0]["rings"])]
-    for r in roads:
-        lines.append(f"| {r['site']}: standing trees found, % | " + " | ".join(
-            f"{100 * ring['recall']:.1f}" if ring["expected"] else "" for ring in r["rings"]) + " |")
-        lines.append(f"| listed trees right, % | " + " | ".join(
-            f"{100 * ring['precision']:.1f}" if ring["reported"] else "" for ring in r["rings"]) + " |")
-    return "\n".join(lines) + "\n"
+    for name, group in (("by stems", roads), ("by all points", points)):
+        for r in group:
+            lines.append(f"| {r['site']} {name}: standing trees found, % | " + " | ".join(
+                f"{100 * ring['recall']:.1f}" if ring["expected"] else "" for ring in r["rings"]) + " |")
+            lines.append("| listed trees right, % | " + " | ".join(
+                f"{100 * ring['precision']:.1f}" if ring["reported"] else "" for ring in r["rings"]) + " |")
+    return lines
+
+
+def page_of(head, roads, points, pairs):
+    sites = [r["site"] for r in roads]
+    columns = [*(f"{site}, by stems" for site in sites), "P1, sSLAM", *(f"{site}, by all points" for site in sites),
+               "P1, LLOAM"]
+    lines = [head, "", "| | " + " | ".join(columns) + " |", "|---|" + "---|" * len(columns)]
+    for name, by_stems, by_points, paper, paper_points in rows_of_roads():
+        cells = [*(by_stems(r) if by_stems else "" for r in roads), paper,
+                 *(by_points(r) if by_points else "" for r in points), paper_points]
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    return "\n".join([*lines, "", *consistency_table(pairs), "", *ring_table(roads, points)]) + "\n"
+
+
+def table_page(sites, seed, folder, seconds=None):
+    """The page of the table; `seconds`: only so much of each road. The runs lie in `folder`, as those of
+    `./run accuracy --figures -o FOLDER --seed SEED --only P1-F9` do, and are not made again."""
+    folder = Path(folder)
+    runs = Runs(folder)
+    jobs = road_jobs_of(sites, seed, seconds)
+    runs.make(jobs.values())
+    made = {key: runs.get(job) for key, job in jobs.items()}
+    for run in made.values():
+        if run.failed:
+            raise Failed(f"{run.job.name}: {run.failed}")
+    measured = folder / "runs"
+    roads = [measure_stems(made[site, "stems"], measured) for site in sites]
+    points = [measure_points(made[site, "loam"], measured) for site in sites]
+    part = "whole sites" if seconds is None else f"first {seconds:g} s of each"
+    return page_of(f"{version()}, seed {seed}; {part}", roads, points, consistencies(roads, points))

@@ -64,17 +64,29 @@ def write_html(folder, entries):
     (folder / "index.html").write_text("\n".join(parts) + "</body></html>\n")
 
 
-def markdown(entries, pictures):
-    """The text of the Markdown page; `pictures` is the folder of the pictures as seen from the page."""
-    lines = ["# The papers' figures, from runs of ours", INTRODUCTION, "",
-             "    ./run accuracy --figures -o FIGURES            # all, from whole recordings",
-             "    ./run accuracy --figures -o FIGURES --short    # minutes instead of hours",
-             "    ./run accuracy --figures -o FIGURES --only P2-F4,P2-F6", "",
-             "The folder then holds this page as `index.html`, the pictures, and the values of each as a CSV file. Runs that",
-             "are there are not made again.", "", f"{version()}. P1 to P4 are the papers of [this list](papers.md).", ""]
-    for e in entries:
-        lines += [f"## {e.key}: {e.title}", f"![{e.key}: {e.title}]({pictures}/{e.picture})", "",
-                  f"- **The paper**: {e.paper}", f"- **Ours**: {e.ours}", f"- **Recordings**: {e.recordings}", "",
-                  "| number | ours | the paper's |", "|---|---|---|"]
-        lines += ["| " + " | ".join(row) + " |" for row in e.numbers] + [""]
-    return "\n".join(lines).rstrip() + "\n"
+def section(entry, pictures):
+    """What the Markdown page says of one figure."""
+    lines = [f"## {entry.key}: {entry.title}", f"![{entry.key}: {entry.title}]({pictures}/{entry.picture})", "",
+             f"- **The paper**: {entry.paper}", f"- **Ours**: {entry.ours}", f"- **Recordings**: {entry.recordings}", "",
+             "| number | ours | the paper's |", "|---|---|---|"]
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in entry.numbers)])
+
+
+def sections_of(page):
+    """The sections of a Markdown page that `markdown` made, by the figures' keys."""
+    parts = [part.strip() for part in ("\n" + page).split("\n## ")[1:]]
+    return {part.split(":")[0]: "## " + part for part in parts}
+
+
+def markdown(entries, pictures, keys, old=""):
+    """The text of the Markdown page; `pictures` is the folder of the pictures as seen from the page. Figures that the
+    page has already (`old`) and that are not among the entries stay as they are. The order is that of `keys`."""
+    head = ["# The papers' figures, from runs of ours", INTRODUCTION, "",
+            "    ./run accuracy --figures -o FIGURES            # all, from whole recordings",
+            "    ./run accuracy --figures -o FIGURES --short    # minutes instead of hours",
+            "    ./run accuracy --figures -o FIGURES --only P2-F4,P2-F6", "",
+            "The folder then holds this page as `index.html`, the pictures, and the values of each as a CSV file. Runs that",
+            "are there are not made again. With `--write` the figures of the folder replace those of this page.", "",
+            f"{version()}. P1 to P4 are the papers of [this list](papers.md)."]
+    sections = sections_of(old) | {entry.key: section(entry, pictures) for entry in entries}
+    return "\n\n".join(["\n".join(head), *(sections[key] for key in keys if key in sections)]) + "\n"

@@ -10,19 +10,17 @@ from figures.paper_figure import PaperFigure
 from figures.data import (Path3, enu, laid_on, list_in_site, moved, off_by, opened, origin_of, paired, read_path,
                           read_table, rms)
 from figures.drawing import COLOURS, Drawn, Sheet
-from figures.runs import Job, reason_of, settings
+from figures.road_jobs import ROADS, WAYS, road_job
+from figures.runs import reason_of
 from program import DONE, UNTRUSTED, Failed, understory
 
-ROADS = ("lieksa1", "lieksa2", "lieksa3")
-WAYS = {"stems": ("by stems (sSLAM)", "ours", ("--front-end", "sparse")),
-        "loam": ("LOAM with ground (LLOAM)", "second",
-                 settings("registration.method=loam_ground", "loop_closure.enabled=false", "map.enabled=false"))}
+COLOUR_OF = {"stems": "ours", "loam": "second"}
 SAME_TREE_M = 0.5  # a stem of a view belongs to the listed tree within this
 FEWEST_VIEWS = 5  # of a tree whose mean axis counts
 
 
 def road_jobs(plan):
-    return {f"{site} {way}": Job(plan.recording(site), way, WAYS[way][2]) for site in ROADS for way in WAYS}
+    return {f"{site} {way}": road_job(plan.recording(site), way) for site in ROADS for way in WAYS}
 
 
 def on_fixes(run, antenna):
@@ -56,7 +54,7 @@ def draw_roads(plan, title, runs):
         if fixed is not None:
             sheet.dots(axes, "fixes", *fixes_of(fixed)[:, :2].T, "fixes", 7)
         antenna = list_in_site(stems.truth, "gnss", "mount_m")
-        for way, (name, colour, _) in WAYS.items():
+        for way, (name, _) in WAYS.items():
             run = runs[f"{site} {way}"]
             if run.failed:
                 remarks += f" {site} {name}: no path ({run.failed})."
@@ -67,7 +65,7 @@ def draw_roads(plan, title, runs):
             except Failed as error:
                 path, _, _ = laid_on(read_path(run.folder / "trajectory.tum"), truth, upright=True)
                 remarks += f" {site} {name} is laid on the truth: {reason_of(error).split(';')[0]}."
-            sheet.line(axes, name, *path.places[:, :2].T, colour)
+            sheet.line(axes, name, *path.places[:, :2].T, COLOUR_OF[way])
             flat, ground = (Path3(p.times, p.places * [1, 1, 0], p.turns) for p in (path, truth))
             errors[way].append(rms(off_by(flat, ground)[1]))
             shapes[way].append(rms(off_by(laid_on(flat, ground, upright=True)[0], ground)[1]))
@@ -163,5 +161,5 @@ def draw_orientations(plan, title, runs):
 FIGURES = [
     PaperFigure("P1-F9", "Odometric paths of three methods", road_jobs, draw_roads),
     PaperFigure("P1-F10", "Orientations of stems along strip road 2",
-                lambda plan: {"run": Job(plan.recording("lieksa2"), "stems", WAYS["stems"][2])}, draw_orientations),
+                lambda plan: {"run": road_job(plan.recording("lieksa2"), "stems")}, draw_orientations),
 ]

@@ -21,6 +21,7 @@ import paper_figures  # noqa: E402
 from figures import strip_roads, walks  # noqa: E402
 from figures.catalogue import all_figures  # noqa: E402
 from figures.data import Path3, enu, laid_on, moved, off_by, paired, read_path, rigid_fit  # noqa: E402
+from figures.page import Entry, markdown  # noqa: E402
 from figures.paper_figure import Plan  # noqa: E402
 from figures.runs import Job, Recording, Run, Runs  # noqa: E402
 from program import understory_json  # noqa: E402
@@ -162,6 +163,16 @@ def tiny_figures(folder):
     check(made == {file: file.stat().st_mtime_ns for file in folder.glob("runs/*/run.json")}, "runs stay as they are")
 
 
+def pages_keep_other_figures():
+    entry = lambda key, words: Entry(key, "t", "r", "p", words, [("a", "1", "")], f"{key}.png", f"{key}.csv")
+    keys = ["P2-F4", "P2-F6", "P4-F21"]
+    old = markdown([entry("P2-F4", "first"), entry("P4-F21", "second")], "pictures", keys)
+    new = markdown([entry("P2-F6", "third"), entry("P4-F21", "fourth")], "pictures", keys, old)
+    at = [new.find(word) for word in ("first", "third", "fourth")]
+    check(-1 < at[0] < at[1] < at[2] and "second" not in new, f"a page that gets two figures: {new}")
+    check(markdown([], "pictures", keys, new) == new, "a page stays as it is where no figure is new")
+
+
 def wrong_use(folder):
     for words, wanted in ((["--only", "P9-F1"], "unknown figure"), (["--seconds", "0"], "1 to"),
                           (["--set", "lidar"], "KEY=VALUE"), (["--seed", "0"], "1 or more")):
@@ -178,6 +189,7 @@ def main():
     os.environ["MPLCONFIGDIR"] = tempfile.mkdtemp()
     geometry()
     means_of_batches()
+    pages_keep_other_figures()
     with tempfile.TemporaryDirectory() as scratch:
         orientations(Path(scratch))
         wrong_use(Path(scratch))
