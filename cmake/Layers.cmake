@@ -8,7 +8,8 @@ endif()
 #   SOURCES            explicit .cc files; without any the layer is headers only
 #   TOGETHER           how many files are compiled as one with UNDERSTORY_UNITY: 8. More save what their
 #                      headers cost, but for Eigen's types the compiler's time grows faster than their number.
-#                      Layers of text, without such types, take more
+#                      Layers of text, without such types, take more. A `|` between two files ends a unit:
+#                      files behind one form a unit of their own, and only their names must differ in it
 #   APART              further ones that are compiled by themselves, also with UNDERSTORY_UNITY: names in
 #                      them clash with others', or their loops are to be optimised for themselves
 #   TESTS              x_test.cc beside x.cc; together the GoogleTest program test_<name>
@@ -62,6 +63,14 @@ function(understory_unite target together)
     target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
   endif()
   foreach(source IN LISTS ARGN)
+    if(source STREQUAL "|")
+      if(batch)
+        understory_write_batch(${target} ${number} "${batch}")
+        math(EXPR number "${number} + 1")
+        set(batch "")
+      endif()
+      continue()
+    endif()
     file(RELATIVE_PATH path "${PROJECT_SOURCE_DIR}/src" "${CMAKE_CURRENT_SOURCE_DIR}/${source}")
     if(NOT UNDERSTORY_UNITY OR IS_ABSOLUTE "${source}" OR path MATCHES "^\\.\\./")
       target_sources(${target} PRIVATE "${source}")

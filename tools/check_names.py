@@ -8,7 +8,8 @@ A number of a table (x_constants.h) and a constant of another file of the layer.
 compiled together, the constant hides the number, if it comes first. Files that are APART are exempt.
 
 Two types or constants of one name in unnamed namespaces of a layer. The number of the layer's files
-decides whether theirs are compiled together, and then they do not compile. APART files are exempt.
+decides whether theirs are compiled together, and then they do not compile. APART files are exempt, and
+so are files between which a `|` stands in the layer's list.
 
 Two of anything of one name in unnamed namespaces of a layer's tests, which are compiled together, too.
 Of functions, the compiler would take the one whose parameters fit. A `using` may stand in several;
@@ -29,6 +30,8 @@ TABLE = re.compile(r"^namespace (\w+) \{.*?\n(.*?)^\}  // namespace \1$", re.MUL
 NUMBER = re.compile(r"inline constexpr [^=;]*?\b(k\w+)(?:\[\])? =")
 USED = re.compile(r"^using namespace (\w+_constants)::(\w+);", re.MULTILINE)
 APART = re.compile(r"^ +APART\s+((?:[\w/.]+\.cc\s+)+)", re.MULTILINE)
+SOURCES = re.compile(r"^ +SOURCES\s(.*?)(?:^ +[A-Z_]+\s|\))", re.MULTILINE | re.DOTALL)
+COMMENT = re.compile(r"#.*")
 CONSTANT = re.compile(r"^(?:static )?constexpr [^=;{(]*?\b(k\w+)\s*(?:\[[^\]]*\])?\s*[={]", re.MULTILINE)
 FUNCTION = re.compile(r"^(?!TEST|TYPED_TEST|INSTANTIATE|using |template|return |struct |class )"
                       r"[\w:][\w:<>,&* ]*?[ &*>](\w+)\(")
@@ -38,12 +41,18 @@ ALIAS = re.compile(r"^(?:using|namespace) (\w+) = ")
 
 
 def united(layer):
-    """The text of each source of the layer that may be compiled together with others."""
+    """For each set of files that may be compiled together: the text of each. Behind each `|` of the layer's list
+    of sources begins a set of its own; the first one takes what stands behind none."""
     lists = layer / "CMakeLists.txt"
-    apart = APART.search(lists.read_text(encoding="utf-8")) if lists.is_file() else None
-    alone = {layer / name for name in apart.group(1).split()} if apart else set()
-    return {path: path.read_text(encoding="utf-8") for path in sorted(layer.rglob("*.cc"))
-            if not path.name.endswith("_test.cc") and path not in alone}
+    listed = COMMENT.sub("", lists.read_text(encoding="utf-8")) if lists.is_file() else ""
+    apart = APART.search(listed)
+    sources = SOURCES.search(listed)
+    sets = [text.split() for text in sources.group(1).split("|")[1:]] if sources else []
+    placed = {layer / name for names in [*sets, apart.group(1).split() if apart else []] for name in names}
+    first = [path for path in sorted(layer.rglob("*.cc"))
+             if not path.name.endswith("_test.cc") and path not in placed]
+    for paths in [first, *([layer / name for name in names] for names in sets)]:
+        yield {path: path.read_text(encoding="utf-8") for path in paths if path.is_file()}
 
 
 def tests(layer):
@@ -147,9 +156,9 @@ def check(tree):
                 yield f"{place}: {name} is also a type of {first[name]}"
             first.setdefault(name, place)
     for layer in sorted(path for path in root.iterdir() if path.is_dir()):
-        sources = united(layer)
-        yield from hidden_numbers(layer, sources)
-        yield from clashes(sources, names_of_source)
+        for sources in united(layer):
+            yield from hidden_numbers(layer, sources)
+            yield from clashes(sources, names_of_source)
         yield from clashes(tests(layer), names_of_test)
         yield from leaks(tests(layer))
 

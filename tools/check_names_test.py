@@ -83,6 +83,11 @@ class CheckNames(unittest.TestCase):
             lists = "understory_layer(a\n  SOURCES\n    one.cc\n  APART\n    x/two.cc\n  DEPENDS util)\n"
             self.assertEqual(findings({"a/one.cc": own(text), "a/x/two.cc": own(text),
                                        "a/CMakeLists.txt": lists}), [])
+            # A unit of its own begins behind a `|`.
+            for behind, count in (("| two.cc", 0), ("| two.cc one.cc", 1), ("two.cc |", 1), ("| one.cc | two.cc", 0)):
+                lists = f"understory_layer(a\n  TOGETHER 9\n  SOURCES three.cc {behind}  # | x\n  DEPENDS util)\n"
+                self.assertEqual(len(findings({"a/one.cc": own(text), "a/two.cc": own(text),
+                                               "a/CMakeLists.txt": lists})), count, behind)
         local = "int f() {\n  constexpr double kNear = 1.0;\n}"
         self.assertEqual(findings({"a/one.cc": own(local), "a/two.cc": own(local)}), [])
 
