@@ -198,6 +198,8 @@ namespace cloud_inventory {  // pipeline/inventory/cloud_inventory.cc
 // m above the ground that a tenth of the canopy model reaches: trees, whose stems must be listed
 // [chosen]
 inline constexpr double kTallWithoutStemsM = 6.0;
+// m: diameter of a tree of such a canopy at least [chosen: forest_constants::kThinnestBasic]
+inline constexpr double kThinnestGrownM = 0.05;
 // Share of the cells of the canopy model that are lower [chosen]
 inline constexpr double kCanopyQuantile = 0.9;
 // m: lower stands may be slender, and are not tall for feet [as kTallForMetres of cloud_shape]

@@ -1,7 +1,9 @@
 #include "understory/forest/search/density_peaks.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <utility>
 
@@ -31,31 +33,23 @@ CoreWeights core_weights() {
 // The cells of one block, with a border.
 class Block {
  public:
-  explicit Block(const Cell& block)
+  Block(const Cell& block, const std::vector<Cell>& points)
       : row0_(block.first * kBlockCells - kBorder),
         column0_(block.second * kBlockCells - kBorder),
-        counts_(static_cast<std::size_t>(kWidth) * kWidth, 0.0F),
-        sums_(static_cast<std::size_t>(kWidth + 1) * (kWidth + 1), 0.0F),
-        core_(counts_.size(), 0.0F) {}
-
-  void add(const Cell& cell) { ++counts_[at(cell.first - row0_, cell.second - column0_)]; }
+        counts_(static_cast<std::size_t>(kWidth) * kWidth, 0) {
+    for (const auto& [row, column] : points) {
+      const Cell cell{row - row0_, column - column0_};
+      if (counts_[at(cell.first, cell.second)]++ == 0) occupied_.push_back(cell);
+    }
+    std::sort(occupied_.begin(), occupied_.end());
+  }
 
   // Peaks of the block without its border.
   [[nodiscard]] std::vector<DensityPeak> peaks() {
-    sum_up();
-    const CoreWeights weights = core_weights();
-    std::vector<Cell> dense;
-    constexpr int kFrom = kBorder - kPeakCells;
-    for (int r = kFrom; r < kWidth - kFrom; ++r) {
-      for (int c = kFrom; c < kWidth - kFrom; ++c) {
-        if (counts_[at(r, c)] == 0.0F) continue;
-        const float core = core_of(r, c, weights);
-        if (core < kLeastCore) continue;
-        core_[at(r, c)] = core;
-        dense.emplace_back(r, c);
-      }
-    }
+    const std::vector<Cell> dense = dense_cells();
     std::vector<DensityPeak> peaks;
+    if (dense.empty()) return peaks;  // as most blocks far from the path
+    sum_up();
     for (const auto& [r, c] : dense) {
       if (!is_within(r) || !is_within(c) || !is_highest(r, c)) continue;
       const double around = around_of(r, c);
@@ -75,10 +69,27 @@ class Block {
     return static_cast<std::size_t>(r) * (kWidth + 1) + static_cast<std::size_t>(c);
   }
 
+  // Cells whose cores hold enough points, by rows; fills in the cores.
+  [[nodiscard]] std::vector<Cell> dense_cells() {
+    const CoreWeights weights = core_weights();
+    constexpr int kFrom = kBorder - kPeakCells;
+    std::vector<Cell> dense;
+    for (const auto& [r, c] : occupied_) {
+      if (r < kFrom || c < kFrom || r >= kWidth - kFrom || c >= kWidth - kFrom) continue;
+      const float core = core_of(r, c, weights);
+      if (core < kLeastCore) continue;
+      if (core_.empty()) core_.resize(counts_.size(), 0.0F);
+      core_[at(r, c)] = core;
+      dense.emplace_back(r, c);
+    }
+    return dense;
+  }
+
   // Sums over all cells of lower rows and columns.
   void sum_up() {
+    sums_.assign(static_cast<std::size_t>(kWidth + 1) * (kWidth + 1), 0);
     for (int r = 0; r < kWidth; ++r) {
-      float row = 0.0F;
+      std::uint32_t row = 0;
       for (int c = 0; c < kWidth; ++c) {
         row += counts_[at(r, c)];
         sums_[sum_at(r + 1, c + 1)] = sums_[sum_at(r, c + 1)] + row;
@@ -91,7 +102,8 @@ class Block {
     for (int i = -kCoreCells; i <= kCoreCells; ++i) {
       float row = 0.0F;
       for (int j = -kCoreCells; j <= kCoreCells; ++j)
-        row += weights[static_cast<std::size_t>(j + kCoreCells)] * counts_[at(r + i, c + j)];
+        row += weights[static_cast<std::size_t>(j + kCoreCells)] *
+               static_cast<float>(counts_[at(r + i, c + j)]);
       sum += weights[static_cast<std::size_t>(i + kCoreCells)] * row;
     }
     return sum;
@@ -138,8 +150,9 @@ class Block {
 
   int row0_;
   int column0_;
-  std::vector<float> counts_;
-  std::vector<float> sums_;
+  std::vector<std::uint32_t> counts_;
+  std::vector<Cell> occupied_;
+  std::vector<std::uint32_t> sums_;
   std::vector<float> core_;
 };
 
@@ -178,10 +191,7 @@ std::vector<DensityPeak> find_density_peaks(const std::vector<Eigen::Vector2f>& 
   std::vector<std::vector<DensityPeak>> found(filled.size());
   parallel_for(filled.size(), 1, [&](std::size_t i) {
     progress.poll();
-    Block block(filled[i]->first);
-    for (const Cell& cell : filled[i]->second)
-      block.add(cell);
-    found[i] = block.peaks();
+    found[i] = Block(filled[i]->first, filled[i]->second).peaks();
   });
   std::vector<DensityPeak> peaks;
   for (const std::vector<DensityPeak>& part : found)

@@ -63,14 +63,23 @@ double canopy_height_of(const Raster& canopy) {
   return heights[static_cast<std::size_t>(at)];
 }
 
+// Whether the list holds any tree that may belong to a high canopy. Thin stems within foliage may
+// be found in a crown that is upside down.
+bool has_grown_trees(const InventoryResult& inventory) {
+  if (inventory.trees.size() > inventory.stems.size()) return true;  // by their crowns
+  return std::any_of(inventory.stems.begin(), inventory.stems.end(), [](const StemFit& stem) {
+    return !stem.in_foliage && 2.0 * stem.radius_m >= kThinnestGrownM;
+  });
+}
+
 // Why the list of a cloud in which stems could be seen is wrong; empty: nothing says so.
 std::string list_complaint(const InventoryResult& inventory, bool unit_given) {
   const double canopy_m = canopy_height_of(inventory.canopy);
-  if (inventory.trees.empty() && !inventory.too_sparse && canopy_m > kTallWithoutStemsM)
+  if (!has_grown_trees(inventory) && !inventory.too_sparse && canopy_m > kTallWithoutStemsM)
     return fmt::format(
-        "no stem was found, though points stand {:.0f} m above the ground: z may not be up (--up), "
-        "or the unit not the metre (--unit-m)",
-        canopy_m);
+        "no stem was found{}, though points stand {:.0f} m above the ground: z may not be up "
+        "(--up), or the unit not the metre (--unit-m)",
+        inventory.trees.empty() ? "" : " but thin ones", canopy_m);
   std::vector<double> heights;
   std::vector<double> ratios;
   for (const Tree& tree : inventory.trees) {
