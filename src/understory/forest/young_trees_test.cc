@@ -39,5 +39,26 @@ TEST(YoungTrees, GreenToTheGroundAreListedByAFullInventory) {
     EXPECT_GE(tree.dbh_m, 0.05);
 }
 
+// Where the cloud was cut off, tops are not those of the trees.
+TEST(YoungTrees, OfACloudThatWasCutOffHaveNoHeight) {
+  TestPlot plot(9);
+  plot.add_ground(12.0, 60);
+  plot.add_stem({3.0, 3.0, 0.3});
+  plot.add_young_tree(6.0, 6.0, 0.03, 4.5, 5'000);
+  plot.add_young_tree(9.0, 4.0, 0.03, 4.8, 5'000);
+  const Tree* tree = nullptr;
+  const InventoryResult whole = take_inventory(blocks_of(plot.cloud), {});
+  tree = nearest(whole.trees, 6.0, 6.0);
+  ASSERT_NE(tree, nullptr);
+  EXPECT_NEAR(tree->height_m, 4.5, 0.2);
+  std::erase_if(plot.cloud, [&](const Eigen::Vector3d& point) {
+    return point.z() - plot.ground(point.x(), point.y()) > 2.9;
+  });
+  const InventoryResult cut = take_inventory(blocks_of(plot.cloud), {});
+  tree = nearest(cut.trees, 6.0, 6.0);
+  ASSERT_NE(tree, nullptr);
+  EXPECT_TRUE(std::isnan(tree->height_m)) << tree->height_m;
+}
+
 }  // namespace
 }  // namespace understory
