@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <vector>
 
@@ -184,6 +185,21 @@ TEST(TiledInventory, TheSameTreesWhateverTheTilesAre) {
     expect_same(whole, tiled);
     EXPECT_EQ(labels, labels_of(tiled, &tiles));
     backwards = !backwards;
+  }
+}
+
+TEST(TiledInventory, AFullOneHasTheTreesOfABasicOneAndThinnerOnes) {
+  const InventoryResult full = take_inventory(blocks_of(strip_of_stems()), {});
+  const InventoryResult basic = take_inventory(blocks_of(strip_of_stems()), basic_inventory());
+  std::vector<Tree> thick;
+  std::copy_if(full.trees.begin(), full.trees.end(), std::back_inserter(thick),
+               [](const Tree& tree) { return tree.dbh_m >= 0.05; });
+  EXPECT_LT(thick.size(), full.trees.size());
+  ASSERT_EQ(thick.size(), basic.trees.size());
+  for (std::size_t i = 0; i < thick.size(); ++i) {
+    EXPECT_EQ(thick[i].x, basic.trees[i].x);
+    EXPECT_EQ(thick[i].y, basic.trees[i].y);
+    EXPECT_EQ(thick[i].dbh_m, basic.trees[i].dbh_m);
   }
 }
 
