@@ -26,8 +26,6 @@ inline constexpr double kLeastContrast = 2.0;
 // Points of a block of a slice at least [bound: time]
 inline constexpr std::size_t kFewestPoints = 4;
 
-// m: edge of the squares in which peaks are looked for [bound: time]
-inline constexpr double kPeakSquare = 0.25;
 // m above the lowest height of the search: there a column begins at most [chosen]
 inline constexpr double kFirstWithin = 1.0;
 // m of height between the two peaks that a line is drawn through, at least ... [chosen]

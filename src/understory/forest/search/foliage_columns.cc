@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
-#include <limits>
-#include <unordered_map>
 #include <utility>
 
 #include "understory/forest/foliage_constants.h"
 #include "understory/forest/search/density_peaks.h"
 #include "understory/forest/stems/stem_axis.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
@@ -18,40 +16,12 @@ namespace {
 
 using namespace foliage_constants;
 
-// Places of the plane sorted into squares, to find those near another.
-template <typename Thing>
-class Squares {
- public:
-  explicit Squares(double edge_m) : edge_m_(edge_m) {}
-
-  void add(const Eigen::Vector2d& place, const Thing& thing) {
-    squares_[key_of(row(place.y()), row(place.x()))].emplace_back(place, thing);
-  }
-  // Calls visit(distance, thing) for all within `reach`.
-  template <typename Visit>
-  void near(const Eigen::Vector2d& place, double reach, const Visit& visit) const {
-    for (int r = row(place.y() - reach); r <= row(place.y() + reach); ++r) {
-      for (int c = row(place.x() - reach); c <= row(place.x() + reach); ++c) {
-        const auto found = squares_.find(key_of(r, c));
-        if (found == squares_.end()) continue;
-        for (const auto& [other, thing] : found->second) {
-          const double distance = (other - place).norm();
-          if (distance <= reach) visit(distance, thing);
-        }
-      }
-    }
-  }
-
- private:
-  [[nodiscard]] int row(double value) const {
-    return static_cast<int>(std::floor(value / edge_m_));
-  }
-  static std::int64_t key_of(int row, int column) {
-    return (static_cast<std::int64_t>(row) << 32) + column;
-  }
-  double edge_m_;
-  std::unordered_map<std::int64_t, std::vector<std::pair<Eigen::Vector2d, Thing>>> squares_;
-};
+SparsePoints in_plane(const std::vector<DensityPeak>& peaks) {
+  SparsePoints points;
+  for (const DensityPeak& peak : peaks)
+    points.emplace_back(peak.place.x(), peak.place.y(), 0.0);
+  return points;
+}
 
 // A straight line that many slices show.
 struct Column {
@@ -81,9 +51,7 @@ class ColumnSearch {
     }
     for (const std::vector<Eigen::Vector2f>& slice : slices) {
       peaks_.push_back(find_density_peaks(slice, progress));
-      Squares<std::size_t>& squares = squares_.emplace_back(kPeakSquare);
-      for (std::size_t i = 0; i < peaks_.back().size(); ++i)
-        squares.add(peaks_.back()[i].place, i);
+      grids_.emplace_back(in_plane(peaks_.back()));
     }
   }
 
@@ -119,9 +87,12 @@ class ColumnSearch {
     const std::size_t last = std::min(peaks_.size() - 1, a + slices_in(kMostSpan));
     for (std::size_t b = a + slices_in(kLeastSpan); b <= last; ++b) {
       const double rise = rise_of(b) - rise_of(a);
-      squares_[b].near(start, kMostSlope * rise, [&](double /*distance*/, std::size_t i) {
+      const double reach = kMostSlope * rise;
+      grids_[b].around({start.x(), start.y(), 0.0}, reach, [&](int i) {
+        const Eigen::Vector2d way = peaks_[b][static_cast<std::size_t>(i)].place - start;
+        if (way.norm() > reach) return;
         Column column;
-        column.slope = (peaks_[b][i].place - start) / rise;
+        column.slope = way / rise;
         column.centre = start - rise_of(a) * column.slope;
         if (is_shown(column)) columns.push_back(column);
       });
@@ -131,14 +102,9 @@ class ColumnSearch {
 
   // The peak of a slice that lies on the line, if there is one.
   [[nodiscard]] const DensityPeak* peak_of(const Column& column, std::size_t slice) const {
-    const DensityPeak* best = nullptr;
-    double least = std::numeric_limits<double>::infinity();
     const Eigen::Vector2d place = column.centre + rise_of(slice) * column.slope;
-    squares_[slice].near(place, kOffLine, [&](double distance, std::size_t i) {
-      if (distance < least) best = &peaks_[slice][i];
-      least = std::min(least, distance);
-    });
-    return best;
+    const int found = grids_[slice].nearest({place.x(), place.y(), 0.0}, kOffLine, 0.0).index;
+    return found < 0 ? nullptr : &peaks_[slice][static_cast<std::size_t>(found)];
   }
 
   // Whether enough slices show the line; sums up how clearly.
@@ -163,14 +129,19 @@ class ColumnSearch {
       if (a.centre.y() != b.centre.y()) return a.centre.y() < b.centre.y();
       return a.slope.x() != b.slope.x() ? a.slope.x() < b.slope.x() : a.slope.y() < b.slope.y();
     });
-    Squares<char> taken(kApart);
+    SparsePoints centres;
+    for (const Column& column : columns)
+      centres.emplace_back(column.centre.x(), column.centre.y(), 0.0);
+    const PlaneGrid grid(centres);
+    std::vector<char> taken(columns.size(), 0);
     std::vector<StemFit> stems;
-    for (const Column& column : columns) {
-      bool free = true;
-      taken.near(column.centre, kApart, [&](double /*distance*/, char) { free = false; });
-      if (!free) continue;
-      taken.add(column.centre, 1);
-      stems.push_back(stem_of(column));
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      if (taken[i] != 0) continue;
+      stems.push_back(stem_of(columns[i]));
+      grid.around(centres[i], kApart, [&](int other) {
+        const auto k = static_cast<std::size_t>(other);
+        if ((centres[k] - centres[i]).norm() <= kApart) taken[k] = 1;
+      });
     }
     return stems;
   }
@@ -206,7 +177,7 @@ class ColumnSearch {
   double lowest_m_;
   double thickness_m_ = 0.0;
   std::vector<std::vector<DensityPeak>> peaks_;  // by slice
-  std::vector<Squares<std::size_t>> squares_;    // of their indices
+  std::vector<PlaneGrid> grids_;                 // of the same
 };
 
 }  // namespace
