@@ -56,7 +56,7 @@ class Trees:
         self.id = column(rows, "id").astype(int)
         self.place = np.column_stack([column(rows, "x"), column(rows, "y")]).reshape(-1, 2)
         self.ground = column(rows, "z")
-        for name in ("dbh_m", "dbh_sd_m", "height_m", "stem_volume_m3", "stem_volume_sd_m3", "crown_base_m", "crown_area_m2", "crown_volume_m3"):
+        for name in ("dbh_m", "dbh_sd_m", "height_m", "height_sd_m", "stem_volume_m3", "stem_volume_sd_m3", "crown_base_m", "crown_area_m2", "crown_volume_m3"):
             setattr(self, name, column(rows, name))
         self.felled = np.array([bool(row.get("felled_at")) for row in rows], dtype=bool)
 
@@ -112,7 +112,7 @@ class Pool:
         self.listed = [0] * len(CLASSES)
         self.false = [0] * len(CLASSES)
         self.dbh = []  # distance, error, stated sd, true
-        self.height = []  # distance, error
+        self.height = []  # distance, error, stated sd, true diameter
         self.curve = []  # distance, height, error, stated sd, measured
         self.volume = []  # distance, estimate, true, stated sd
         self.position = []
@@ -158,7 +158,7 @@ class Pool:
         for i, j in pairs.items():
             self.position.append((away[j], *(places[i] - truth.place[j])))
             self.dbh.append((away[j], run_trees.dbh_m[i] - truth.dbh_m[j], run_trees.dbh_sd_m[i], truth.dbh_m[j]))
-            self.height.append((away[j], run_trees.height_m[i] - truth.height_m[j]))
+            self.height.append((away[j], run_trees.height_m[i] - truth.height_m[j], run_trees.height_sd_m[i], truth.dbh_m[j]))
             self.volume.append((away[j], run_trees.stem_volume_m3[i], truth.stem_volume_m3[j], run_trees.stem_volume_sd_m3[i]))
             own = curves.get(int(run_trees.id[i]))
             true = truth_curves.get(int(truth.id[j]))
@@ -227,8 +227,7 @@ class Pool:
         print("| diameter | within | expected | found | listed | false |\n|---|---|---|---|---|---|")
         for k, (least, most, reach) in enumerate(CLASSES):
             share = lambda part, whole: f"{part} ({100 * part / whole:.1f} %)" if whole else "-"
-            size = f"{100 * least:.0f} cm and more" if most > 1 else f"{100 * least:.0f} to {100 * most:.0f} cm"
-            print(f"| {size} | {reach:.0f} m | {self.expected[k]} | {share(self.found[k], self.expected[k])} | {self.listed[k]} | {share(self.false[k], self.listed[k])} |")
+            print(f"| {size_of(least, most)} | {reach:.0f} m | {self.expected[k]} | {share(self.found[k], self.expected[k])} | {self.listed[k]} | {share(self.false[k], self.listed[k])} |")
         print("\n| from the path | quantity | number | bias | RMSE | median | within 1 sd | within 2 sd |\n|---|---|---|---|---|---|---|---|")
         dbh = np.array(self.dbh)
         for least, most in ((0, 8), (8, 15), (0, 15), (15, 30)):
@@ -238,6 +237,10 @@ class Pool:
         for least, most in ((0, 8), (8, 15), (15, 30)):
             near = heights[(heights[:, 0] >= least) & (heights[:, 0] < most) & np.isfinite(heights[:, 1])]
             line(f"{least} to {most} m", "height, m", near[:, 1], None, 1)
+        for least, most, reach in CLASSES[1:]:
+            for rows, what, scale in ((dbh, "diameter, cm", 100), (heights, "height, m", 1)):
+                part = rows[(rows[:, 0] <= reach) & (rows[:, 3] >= least) & (rows[:, 3] < most) & np.isfinite(rows[:, 1])]
+                line(f"0 to {reach:.0f} m", f"of {size_of(least, most)}: {what}", part[:, 1], part[:, 2], scale)
         if self.curve:
             curve = np.array(self.curve)
             for low, high in ((0.3, 1), (1, 2), (2, 4), (4, 6), (6, 8), (8, 12), (0.3, 6)):
@@ -257,6 +260,10 @@ class Pool:
         near = place[place[:, 0] < 15]
         print(f"\nposition within 15 m of the path: RMSE {100 * math.sqrt(np.mean(near[:, 1:] ** 2) * 2):.1f} cm")
         self.tell_truth()
+
+
+def size_of(least, most):
+    return f"{100 * least:.0f} cm and more" if most > 1 else f"{100 * least:.0f} to {100 * most:.0f} cm"
 
 
 def line(where, what, errors, sds, scale):

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include "understory/forest/search/circle_search.h"
 #include "understory/forest/search/foliage_columns.h"
@@ -346,40 +347,44 @@ void add_unclaimed(const std::vector<StemFitResult>& fits, const StemDetectorCon
   }
 }
 
-// A fit to a column within foliage that is a stem, or has not converged.
-StemFitResult fit_column(const Search& search, const StemFit& column,
+// A fit to a thin column that is a stem thinner than `most_m`, or has not converged. It stands
+// clear or within foliage.
+StemFitResult fit_column(const Search& search, const StemFit& column, double most_m,
                          const StemDetectorConfig& config) {
+  const auto is_thinner = [&](const StemFitResult& fit) {
+    return fit.converged && 2.0 * fit.stem.radius_m < most_m;
+  };
+  const StemFitResult clear = fit_start(search, column, cut_of(StemCut::kThin, config), config);
+  if (is_thinner(clear)) return clear;
   const std::vector<SlicePoint> near = unexplained_near(search, column, config);
   StemFitResult fit = fit_in_foliage(near, column, config);
   fit.stem.in_foliage = true;
-  fit.converged = is_foliage_stem(fit, near, search, config);
+  fit.converged = is_thinner(fit) && is_foliage_stem(fit, near, search, config);
   return fit;
+}
+
+// Stems of config.min_dbh_m and more, but thinner than `most_m`, that show as thin columns.
+void add_thin_stems(double most_m, const StemDetectorConfig& config, const StemSearchArea& where,
+                    const ProgressSink& progress, Search& search) {
+  const std::vector<StemFit> columns =
+      find_foliage_columns(search.points, search.explained, config, where, progress);
+  const std::vector<StemFitResult> fits = fit_all(columns, progress, [&](const StemFit& column) {
+    return fit_column(search, column, most_m, config);
+  });
+  add_unclaimed(fits, config, search);
 }
 
 void add_foliage_stems(const StemDetectorConfig& config, const StemSearchArea& where,
                        const ProgressSink& progress, Search& search) {
-  const std::vector<StemFit> columns =
-      find_foliage_columns(search.points, search.explained, config, where, progress);
-  const auto fit = [&](const StemFit& column) { return fit_column(search, column, config); };
-  add_unclaimed(fit_all(columns, progress, fit), config, search);
+  add_thin_stems(std::numeric_limits<double>::infinity(), config, where, progress, search);
 }
 
-// Stems that are thinner than the others, within foliage or not.
+// Those that the search before left out as too thin.
 void add_thinnest_stems(const StemDetectorConfig& config, const StemSearchArea& where,
                         const ProgressSink& progress, Search& search) {
   StemDetectorConfig thin = config;
   thin.min_dbh_m = config.thin_dbh_m;
-  const Cut cut{config.slice_m, config.min_slices, kThinReach, kThinBand};
-  const std::vector<StemFit> columns =
-      find_foliage_columns(search.points, search.explained, thin, where, progress);
-  std::vector<StemFitResult> fits = fit_all(columns, progress, [&](const StemFit& column) {
-    const StemFitResult fit = fit_start(search, column, cut, thin);
-    return fit.converged ? fit : fit_column(search, column, thin);
-  });
-  // What is not thinner was not accepted before.
-  std::erase_if(
-      fits, [&](const StemFitResult& fit) { return 2.0 * fit.stem.radius_m >= config.min_dbh_m; });
-  add_unclaimed(fits, thin, search);
+  add_thin_stems(config.min_dbh_m, thin, where, progress, search);
 }
 
 void add_stems(const Cut& cut, const StemDetectorConfig& config, const StemSearchArea& where,
