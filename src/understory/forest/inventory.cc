@@ -11,14 +11,12 @@
 
 #include "understory/forest/cell_grid.h"
 #include "understory/forest/forest_constants.h"
-#include "understory/forest/near_and_far.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/tiles/stem_tiles.h"
 #include "understory/forest/trees/double_images.h"
 #include "understory/forest/trees/tree_crowns.h"
 #include "understory/forest/trees/tree_doubt.h"
 #include "understory/forest/trees/tree_heights.h"
-#include "understory/util/parallel.h"
 
 namespace understory {
 namespace {
@@ -66,27 +64,19 @@ std::vector<Tree> trees_of(const InventoryResult& result, const std::vector<doub
 // Takes away what wide beams add to the radii, and says how sure these are.
 void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3d>& scanner,
                       InventoryResult& result) {
-  parallel_for(result.stems.size(), 16, [&](std::size_t i) {
-    StemFit& stem = result.stems[i];
+  for (StemFit& stem : result.stems) {
     Eigen::Vector3d place = result.origin;
     place.head<2>() += stem.centre;
     place.z() = result.ground.terrain.interpolate(place.x(), place.y()) + kBreastHeight;
     const double range = mean_range_to(scanner, place);
-    const BeamFootprint sheet = footprint_at(config, range);
-    stem.beam = brightened(sheet, result.bark.times);
+    stem.beam = footprint_at(config, range);
     stem.beam_excess_m = excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg);
-    const double excess_sd = excess_sd_m(result.bark, sheet, stem.radius_m, stem.arc_deg);
     stem.radius_m -= stem.beam_excess_m;
     const double sd = diameter_sd_m(stem.spread_m, stem.arc_deg, range, stem.beam);
-    const double foliage_sd = stem.in_foliage ? kFoliageRadiusSd : 0.0;
-    stem.covariance(2, 2) = 0.25 * sd * sd + excess_sd * excess_sd +
-                            stem.below_sd_m * stem.below_sd_m + foliage_sd * foliage_sd;
-  });
-}
-
-// Whether the beams that met the stems are known.
-bool knows_beams(const BeamConfig& config, const std::vector<Eigen::Vector3d>& scanner) {
-  return !scanner.empty() && footprint_at(config, kBreastHeight).sd_m > 0.0;
+    const double foliage_sd_m = stem.in_foliage ? kFoliageRadiusSd : 0.0;
+    stem.covariance(2, 2) =
+        0.25 * sd * sd + stem.below_sd_m * stem.below_sd_m + foliage_sd_m * foliage_sd_m;
+  }
 }
 
 void add_volumes(InventoryResult& result) {
@@ -248,23 +238,6 @@ void remark_on_stems(const StemHarvest& gathered, const InventoryConfig& config,
   }
 }
 
-void remark_on_bark(InventoryResult& result) {
-  const BarkBrightness& bark = result.bark;
-  if (result.stems.empty()) return;
-  if (!bark.learnt) {
-    result.remarks.push_back(fmt::format(
-        "{} stems were seen both from near and from afar: too few to learn from. Diameters of far "
-        "stems rest on the data sheet of the lidar alone.",
-        bark.stems));
-    return;
-  }
-  result.remarks.push_back(
-      fmt::format("{} stems were seen both from near and from afar. They show that bark is {:.1f} "
-                  "times as bright to this lidar as its data sheet tells. Diameters are corrected "
-                  "for that.",
-                  bark.stems, bark.times));
-}
-
 void remark(const StemHarvest& gathered, const InventoryConfig& config, InventoryResult& result) {
   remark_on_stems(gathered, config, result);
   if (result.ground.measured_share < kLeastMeasured) {
@@ -410,15 +383,13 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
 
 InventoryResult take_inventory(const PointBlocks& cloud, const InventoryConfig& config,
                                const ProgressSink& progress, const Lookouts& lookouts,
-                               const std::vector<Eigen::Vector3d>& scanner,
-                               const MeasuredCloud& measured) {
-  return take_inventory(WholeCloud(cloud), config, progress, lookouts, scanner, measured);
+                               const std::vector<Eigen::Vector3d>& scanner) {
+  return take_inventory(WholeCloud(cloud), config, progress, lookouts, scanner);
 }
 
 InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& config,
                                const ProgressSink& progress, const Lookouts& lookouts,
-                               const std::vector<Eigen::Vector3d>& scanner,
-                               const MeasuredCloud& measured) {
+                               const std::vector<Eigen::Vector3d>& scanner) {
   const PointBlocks unasked = [&](const PointVisitor& visit) { cloud.all(visit); };
   const auto tell = [&](const char* stage, double done) {
     progress({stage, done, 8.0, "steps", ""});
@@ -440,12 +411,6 @@ InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& c
   result.points = gathered.points;
   result.slices = std::move(gathered.slices);
   result.stems = std::move(gathered.stems);
-  if (knows_beams(config.beam, scanner)) {
-    result.bark = learn_brightness(
-        config.beam, look_from_afar(measured, result.ground, result.origin, result.stems,
-                                    search_of(config.stems, config.extent), progress));
-    remark_on_bark(result);
-  }
   compensate_beams(config.beam, scanner, result);
   result.thin = gathered.coverage.thin();
   measure_above(cloud, config, progress, {lookouts, scanner}, gathered, result);

@@ -8,10 +8,8 @@
 
 #include "understory/forest/doubtful_trees.h"
 #include "understory/forest/ground/ground.h"
-#include "understory/forest/measured_cloud.h"
 #include "understory/forest/stand/seen_area.h"
 #include "understory/forest/stand/stand_config.h"
-#include "understory/forest/stems/bark_brightness.h"
 #include "understory/forest/stems/beam_footprint.h"
 #include "understory/forest/stems/stem_curve.h"
 #include "understory/forest/stems/stem_detector.h"
@@ -92,7 +90,6 @@ struct InventoryResult {
   ThinCoverage thin;                  // where stems may be missing, without the origin
   std::uint64_t points = 0;
   double area_m2 = 0.0;     // squares of 2 m that hold points
-  BarkBrightness bark;      // as stems tell that were seen from near and from afar
   VisibleArea seen;         // where stems could be seen; empty of a cloud from above and of a cut
   std::string two_images;   // why its scans do not lie on each other; empty: nothing says so
   bool too_sparse = false;  // for stems: some are missing from the list
@@ -103,22 +100,18 @@ struct InventoryResult {
 // Ground, canopy, trees of a whole cloud: six runs through it. With `lookouts` trees that may go on
 // above the view have no height, and tops that were hardly seen are lower bounds. `scanner`: where
 // it was, metres, world frame. With it only what is in its sight counts as seen, and diameters are
-// corrected for the width of its beams. With `measured` the stand tells by itself how bright its
-// bark is to the lidar (near_and_far.h): two more runs. Deterministic for any number of threads.
-// Throws Stopped.
+// corrected for the width of its beams. Deterministic for any number of threads. Throws Stopped.
 [[nodiscard]] InventoryResult take_inventory(const PointBlocks& cloud,
                                              const InventoryConfig& config,
                                              const ProgressSink& progress = {},
                                              const Lookouts& lookouts = {},
-                                             const std::vector<Eigen::Vector3d>& scanner = {},
-                                             const MeasuredCloud& measured = {});
+                                             const std::vector<Eigen::Vector3d>& scanner = {});
 // The same of a cloud in tiles, in the memory that one of them needs: the same trees whatever the
 // tiles are.
 [[nodiscard]] InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& config,
                                              const ProgressSink& progress = {},
                                              const Lookouts& lookouts = {},
-                                             const std::vector<Eigen::Vector3d>& scanner = {},
-                                             const MeasuredCloud& measured = {});
+                                             const std::vector<Eigen::Vector3d>& scanner = {});
 
 // The id of the tree that a point of the cloud belongs to, 0 if none; of a full inventory.
 // `height_m` is its height above the ground.

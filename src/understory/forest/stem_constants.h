@@ -357,23 +357,6 @@ inline constexpr int kAcrossSteps = 100;
 inline constexpr double kNearest = 0.5;
 }  // namespace beam_footprint
 
-namespace bark_brightness {  // forest/stems/bark_brightness.cc
-// Standard deviation of the logarithm of the brightness beforehand [chosen: bark reflects 0.2 to
-// 0.75 of the light, and lidars differ from their data sheets by as much]
-inline constexpr double kLogSd = 1.0;
-// Degrees of freedom of Student's t [chosen: one far fit in ten is wrong]
-inline constexpr double kFreedom = 4.0;
-// Stems that have to be seen from near and from afar [chosen]
-inline constexpr int kLeastStems = 8;
-// m of diameter that all pairs share [tuned on `random` 4, 5, 9, 16: their means differ from the
-// truth by 0.2 to 0.6 cm]
-inline constexpr double kSharedSd = 0.005;
-// Stated deviations that single stems scatter by at least [chosen]
-inline constexpr double kLeastScale = 0.3;
-// Standard deviation over the median distance from the median [bound: Gauss]
-inline constexpr double kSdOverMad = 1.483;
-}  // namespace bark_brightness
-
 namespace noisy_cylinder {  // forest/stems/noisy_cylinder.cc
 // m: scatter of ranges at least [bound: noise of lidars]
 inline constexpr double kLeastScatter = 0.004;

@@ -13,8 +13,7 @@ constexpr double kSmallest = 0.001;  // m
 
 }  // namespace
 
-SliceThinner::SliceThinner(double cube_m, std::size_t first_limit)
-    : cube_m_(std::max(cube_m, kSmallest)), limit_(first_limit) {}
+SliceThinner::SliceThinner(double cube_m) : cube_m_(std::max(cube_m, kSmallest)) {}
 
 void SliceThinner::add(double x, double y, double height_m) {
   const Eigen::Array3d in_cubes = Eigen::Array3d(x, y, height_m) / cube_m_;

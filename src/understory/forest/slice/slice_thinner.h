@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -15,9 +14,8 @@ namespace understory {
 // points changes nothing.
 class SliceThinner {
  public:
-  // A cube of less than 1 mm counts as one of 1 mm. `first_limit`: points that are gathered before
-  // they are thinned the first time; has room for them.
-  explicit SliceThinner(double cube_m, std::size_t first_limit = 1'000'000);
+  // A cube of less than 1 mm counts as one of 1 mm.
+  explicit SliceThinner(double cube_m);
   // Points more than 8 million cubes from zero are left out.
   void add(double x, double y, double height_m);
   // The lower corner of the cube that holds a place.
@@ -35,7 +33,7 @@ class SliceThinner {
 
   double cube_m_;
   std::vector<Entry> entries_;
-  std::size_t limit_;
+  std::size_t limit_ = 1'000'000;
 };
 
 }  // namespace understory

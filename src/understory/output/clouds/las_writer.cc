@@ -41,12 +41,12 @@ TimeNs gps_ahead_of_utc(TimeNs unix_time) {
   return 13 * kNsPerSecond;
 }
 
-}  // namespace
-
 double las_time(TimeNs stamp) {
   if (stamp < kYear2000) return to_seconds(stamp);
   return to_seconds(stamp + gps_ahead_of_utc(stamp) - kUnixAtGpsEpoch - kAdjustedGps);
 }
+
+}  // namespace
 
 bool has_room(const LasOptions& options, const Eigen::Vector3d& point) {
   return ((point - options.offset).cwiseQuotient(options.scale).array().abs() < kMostSteps).all();

@@ -27,10 +27,6 @@ struct LasRecord {
   float height_above_ground = 0;  // metres; NaN where the ground is not known
 };
 
-// The time of LAS files for a stamp, seconds: adjusted standard GPS time if it is of this century
-// (Unix time), else as it is.
-[[nodiscard]] double las_time(TimeNs stamp);
-
 // Whether a point has room in a file: it is near enough to the offset.
 [[nodiscard]] bool has_room(const LasOptions& options, const Eigen::Vector3d& point);
 

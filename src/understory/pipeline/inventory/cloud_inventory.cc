@@ -20,7 +20,6 @@
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/inventory/labelled_cloud.h"
 #include "understory/pipeline/inventory/lidar_view.h"
-#include "understory/pipeline/inventory/measured_map.h"
 #include "understory/pipeline/inventory/stand_documents.h"
 #include "understory/pipeline/inventory/stand_plots.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
@@ -291,11 +290,8 @@ InventoryResult inventory_of(const InventoryRequest& request, const Stock& stock
   const std::vector<Eigen::Vector3d> scanner = scanner_places(request, stock);
   InventoryConfig config = request.config;
   if (stock.of_run) config.beam = beams_in_run(config.beam, request.cloud);
-  const MeasuredCloud measured =
-      stock.of_run ? measured_in_run(request.cloud, stock.stand) : MeasuredCloud();
-  if (!stock.stand.streamed)
-    return take_inventory(blocks, config, progress, seen, scanner, measured);
-  return take_inventory(*stock.stand.streamed->tiles, config, progress, seen, scanner, measured);
+  if (!stock.stand.streamed) return take_inventory(blocks, config, progress, seen, scanner);
+  return take_inventory(*stock.stand.streamed->tiles, config, progress, seen, scanner);
 }
 
 void take_stock(const InventoryRequest& request, const RunFolder& place, const fs::path& results,

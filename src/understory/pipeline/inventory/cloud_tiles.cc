@@ -151,12 +151,6 @@ void CloudTiles::in(const GroundArea& area, const PointVisitor& visit) const {
   if (!places.empty()) visit(places);
 }
 
-void CloudTiles::all_records(const RecordVisitor& visit) const {
-  std::vector<TilePoint> loaded;
-  for (const auto& [index, cell] : cells_)
-    visit_cell(cell, loaded, visit);
-}
-
 void CloudTiles::records_in(const GroundArea& area, const RecordVisitor& visit) const {
   std::vector<TilePoint> loaded;
   for (const auto& [index, cell] : cells_) {

@@ -53,9 +53,8 @@ class CloudTiles : public TiledCloud {
   [[nodiscard]] ScratchFile* scratch() const override { return &scratch_; }
 
   using RecordVisitor = std::function<void(std::span<const TilePoint>)>;
-  // As `in` and `all`, with all that is known of the points.
+  // As `in`, with all that is known of the points.
   void records_in(const GroundArea& area, const RecordVisitor& visit) const;
-  void all_records(const RecordVisitor& visit) const;
   [[nodiscard]] Eigen::Vector3d world(const TilePoint& point) const {
     return origin_ + point.place.cast<double>();
   }

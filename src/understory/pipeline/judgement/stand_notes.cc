@@ -68,9 +68,6 @@ void note_doubts(const InventoryResult& inventory, RunSummary& summary) {
   count("look_again_places", inventory.look_again.size());
   count("look_again_trees", trees_at(inventory.look_again));
   summary.quality["thin_coverage_share"] = inventory.thin.share;
-  if (!inventory.bark.learnt) return;
-  count("stems_near_and_far", static_cast<std::size_t>(inventory.bark.stems));
-  summary.quality["bark_brightness"] = inventory.bark.times;
 }
 
 std::string terminal_notes(const InventoryResult& inventory) {

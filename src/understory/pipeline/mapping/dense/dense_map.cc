@@ -3,7 +3,6 @@
 
 #include "understory/forest/cloud_shape.h"
 #include "understory/pipeline/inventory/lidar_view.h"
-#include "understory/pipeline/inventory/measured_map.h"
 #include "understory/pipeline/judgement/input_remarks.h"
 #include "understory/pipeline/mapping/dense/dense_front_end.h"
 #include "understory/pipeline/mapping/dense/dense_results.h"
@@ -64,9 +63,8 @@ class DenseMap : public MapMaker {
                                               recording_.work);
     InventoryConfig config = front_end_.config().inventory;
     config.beam = beams_in(config.beam, front_end_.rig());
-    made_.inventory =
-        take_inventory(*made_.forest, config, recording_.progress, seen_from(view, poses),
-                       places_of(poses), measured_map(*made_.tiles, made_.trajectory.trajectory));
+    made_.inventory = take_inventory(*made_.forest, config, recording_.progress,
+                                     seen_from(view, poses), places_of(poses));
     made_.lidar_view = figures_of(view);
     if (front_end_.counts().imu_samples == 0)
       made_.not_upright =
