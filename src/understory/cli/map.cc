@@ -193,7 +193,8 @@ void add_map_command(CLI::App& app, Command& chosen) {
   command
       ->add_option("--inventory", options->inventory,
                    "What is measured of the trees. basic (if not given): diameters and heights. "
-                   "full: also stem curves, volumes, crowns and the tree of each point")
+                   "full: also stem curves, volumes, crowns, the tree of each point, and trees "
+                   "of 2 to 5 cm")
       ->check(CLI::IsMember({"basic", "full"}));
   add_plot_options(*command, options->plots);
   command->add_flag("--copc", options->copc,
