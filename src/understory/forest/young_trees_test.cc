@@ -5,7 +5,6 @@
 
 #include "understory/forest/inventory.h"
 #include "understory/forest/test_plot.h"
-#include "understory/util/random.h"
 
 namespace understory {
 namespace {
@@ -38,22 +37,6 @@ TEST(YoungTrees, GreenToTheGroundAreListedByAFullInventory) {
   EXPECT_LT(basic.trees.size(), full.trees.size());
   for (const Tree& tree : basic.trees)
     EXPECT_GE(tree.dbh_m, 0.05);
-}
-
-// The post of a fence that is overgrown is dense, thin and upright, too. Foliage stands only along
-// the fence.
-TEST(YoungTrees, APostOfAnOvergrownFenceIsNone) {
-  TestPlot plot(10);
-  plot.add_ground(12.0, 60);
-  plot.add_stem({3.0, 3.0, 0.3});
-  Random random(11);
-  for (int i = 0; i < 6'000; ++i)
-    plot.cloud.emplace_back(8.0 + random.uniform(-2.0, 2.0), 8.0 + random.normal(0.0, 0.05),
-                            100.0 + random.uniform(0.1, 3.4));
-  for (int i = 0; i < 400; ++i)
-    plot.cloud.emplace_back(8.0 + random.normal(0.0, 0.018), 8.0 + random.normal(0.0, 0.018),
-                            100.0 + random.uniform(0.1, 3.4));
-  EXPECT_EQ(take_inventory(blocks_of(plot.cloud), {}).trees.size(), 1U);
 }
 
 // Where the cloud was cut off, tops are not those of the trees.
