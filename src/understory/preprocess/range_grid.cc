@@ -47,13 +47,14 @@ void RangeGrid::add(int level, const Eigen::Vector3f& place, std::uint32_t point
   cells.first.set(key, entry);
 }
 
-float RangeGrid::nearest(const Eigen::Vector3f& place, float range, float enough,
-                         std::uint32_t but) const {
+RangeGrid::Nearest RangeGrid::nearest(const Eigen::Vector3f& place, float range, float enough,
+                                      std::uint32_t but) const {
   static_assert(VoxelIndex::kNone == kNoPoint);
   const Level& cells = levels_[static_cast<std::size_t>(level_of(range))];
   const float metres = unit(range);
   const float stop = enough * metres;
-  float best2 = reach_ * reach_ * metres * metres;
+  float first2 = reach_ * reach_ * metres * metres;
+  float second2 = first2;
   const int x = voxel_floor(place.x() / cells.side_m);
   const int y = voxel_floor(place.y() / cells.side_m);
   const int z = voxel_floor(place.z() / cells.side_m);
@@ -62,11 +63,13 @@ float RangeGrid::nearest(const Eigen::Vector3f& place, float range, float enough
         voxel_key(x + step_of(cell % 3), y + step_of(cell / 3 % 3), z + step_of(cell / 9)));
     for (; at != kNoPoint; at = entries_[at].next) {
       if (entries_[at].point == but) continue;
-      best2 = std::min(best2, (entries_[at].place - place).squaredNorm());
+      const float distance2 = (entries_[at].place - place).squaredNorm();
+      second2 = std::min(second2, std::max(first2, distance2));
+      first2 = std::min(first2, distance2);
     }
-    if (best2 <= stop * stop) break;
+    if (first2 <= stop * stop) break;
   }
-  return std::sqrt(best2) / metres;
+  return {std::sqrt(first2) / metres, std::sqrt(second2) / metres};
 }
 
 }  // namespace understory

@@ -21,11 +21,16 @@ class RangeGrid {
   // far from its place at the scan the lidar may be when it asks; beyond it points are missed.
   RangeGrid(const Points& points, const std::vector<float>& range, double reach, double moved_m);
 
-  // Distance from a place to the nearest point, as a share of `unit(range)`; `reach` where none is
-  // as near. Ends early with a larger value, as soon as one is found that is not above `enough`.
-  // `range`: of the place from the lidar; `but`: a point that does not count.
-  [[nodiscard]] float nearest(const Eigen::Vector3f& place, float range, float enough,
-                              std::uint32_t but = kNoPoint) const;
+  // Distances to the nearest point and to the second nearest, as shares of `unit(range)`; the reach
+  // where none is as near.
+  struct Nearest {
+    float first = 0.0F;
+    float second = 0.0F;
+  };
+  // From a place. Ends early with larger values, as soon as `first` is found not to be above
+  // `enough`. `range`: of the place from the lidar; `but`: a point that does not count.
+  [[nodiscard]] Nearest nearest(const Eigen::Vector3f& place, float range, float enough,
+                                std::uint32_t but = kNoPoint) const;
   // What distances are a share of, metres: the errors of a lidar do not vanish close by.
   [[nodiscard]] static float unit(float range) { return 0.1F + range; }
 

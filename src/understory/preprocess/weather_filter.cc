@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "understory/geometry/pose_io.h"
+#include "understory/preprocess/lone_share.h"
 #include "understory/preprocess/preprocess_constants.h"
 #include "understory/util/parallel.h"
 
@@ -25,6 +26,37 @@ float bright_of(std::vector<float> intensity) {
   const auto at = static_cast<std::ptrdiff_t>(kBrightShare * (intensity.size() - 1.0));
   std::nth_element(intensity.begin(), intensity.begin() + at, intensity.end());
   return intensity[static_cast<std::size_t>(at)];
+}
+
+// How far apart from others, by the nearest of them and the second nearest: one may be there by
+// chance.
+float apart_of(const RangeGrid::Nearest& nearest) {
+  return std::cbrt(nearest.first * nearest.first * nearest.second);
+}
+
+// The distance of the nearest at which `apart_of` is `apart`, with this one of the second nearest.
+float enough(float apart, float second) { return std::sqrt(apart * apart * apart / second); }
+
+// 1 where the return before or the one after on the ring is about as far: within this share of it.
+std::vector<std::uint8_t> continuing(const BodyCloud& cloud, float within) {
+  constexpr std::uint32_t kNone = UINT32_MAX;
+  std::vector<std::uint32_t> last;  // of each ring
+  std::vector<std::uint8_t> continues(cloud.size(), 0);
+  for (std::uint32_t i = 0; i < cloud.size(); ++i) {
+    if (cloud.ring[i] >= last.size()) last.resize(cloud.ring[i] + std::size_t{1}, kNone);
+    const std::uint32_t before = std::exchange(last[cloud.ring[i]], i);
+    if (before == kNone) continue;
+    const float step = std::abs(cloud.range[i] - cloud.range[before]);
+    if (step <= within * RangeGrid::unit(cloud.range[i])) continues[i] = 1;
+    if (step <= within * RangeGrid::unit(cloud.range[before])) continues[before] = 1;
+  }
+  return continues;
+}
+
+// How far a return may be doubted where a share of those around it stands alone, 0..1: the more of
+// them, the sooner it is weather itself.
+double expected(double share) {
+  return std::pow(std::min((share + kLoneAnywhere) / kLoneInWeather, 1.0), kByLoneShare);
 }
 
 void keep_only(const std::vector<std::uint8_t>& keep, BodyCloud& cloud) {
@@ -97,25 +129,51 @@ std::vector<std::uint8_t> WeatherFilter::judge(const BodyCloud& cloud,
     past_from_body.back().linear() = pose.rotation_matrix().cast<float>();
     past_from_body.back().translation() = pose.translation().cast<float>();
   }
-  const auto reach = static_cast<float>(config_.reach);
-  const auto apart = static_cast<float>(config_.apart);
+  const std::vector<Lone> lone = find_lone(cloud, bright, past_from_body);
+  std::vector<std::uint8_t> alone(cloud.size());
+  for (std::size_t i = 0; i < lone.size(); ++i)
+    alone[i] = lone[i].alone ? 1 : 0;
+  const LoneShare share(cloud.ring, cloud.t_ns, cloud.range, alone);
   parallel_for(cloud.size(), kGrain, [&](std::size_t i) {
-    const float least = apart * (std::max(cloud.intensity[i], 0.0F) / bright + kDarkest);
-    const float product = least * least;
-    if (product >= reach * reach) return;
-    const float range = cloud.range[i];
-    const float here =
-        now_.grid.nearest(cloud.points[i], range, product / reach, static_cast<std::uint32_t>(i));
-    if (here * reach <= product) return;
-    float then = before_.empty() ? here : reach;
-    for (std::size_t k = 0; k < before_.size(); ++k) {
-      if (then * here <= product) return;
-      then = std::min(then, before_[k].grid.nearest(past_from_body[k] * cloud.points[i], range,
-                                                    product / here));
-    }
-    if (then * here > product) keep[i] = 0;
+    if (lone[i].excess > 0.0F && lone[i].excess * expected(share.around(i)) > 1.0) keep[i] = 0;
   });
   return keep;
+}
+
+std::vector<WeatherFilter::Lone> WeatherFilter::find_lone(
+    const BodyCloud& cloud, float bright,
+    const std::vector<Eigen::Isometry3f>& past_from_body) const {
+  std::vector<Lone> lone(cloud.size());
+  const auto reach = static_cast<float>(config_.reach);
+  const auto apart = static_cast<float>(config_.apart);
+  const std::vector<std::uint8_t> continues = continuing(cloud, reach);
+  parallel_for(cloud.size(), kGrain, [&](std::size_t i) {
+    const float range = cloud.range[i];
+    const float least = apart * (std::max(cloud.intensity[i], 0.0F) / bright + kDarkest) *
+                        std::pow(kUsualRangeM / RangeGrid::unit(range), kByRange) *
+                        (continues[i] != 0 ? kContinues : 1.0F);
+    const float product = least * least;
+    if (!(product < reach * reach)) return;
+    const RangeGrid::Nearest now = now_.grid.nearest(
+        cloud.points[i], range, enough(product / reach, reach), static_cast<std::uint32_t>(i));
+    const float here = apart_of(now);
+    if (here * reach <= product) return;
+    RangeGrid::Nearest past = before_.empty() ? now : RangeGrid::Nearest{reach, reach};
+    for (std::size_t k = 0; k < before_.size(); ++k) {
+      // What goes along with the lidar was where it is now, seen from there.
+      const Eigen::Vector3f place =
+          cloud.is_carried(i) ? cloud.points[i] : past_from_body[k] * cloud.points[i];
+      const RangeGrid::Nearest seen =
+          before_[k].grid.nearest(place, range, enough(product / here, past.second));
+      past = {std::min(past.first, seen.first), std::min(past.second, seen.second)};
+      if (apart_of(past) * here <= product) return;
+    }
+    const float then = apart_of(past);
+    if (then * here <= product) return;
+    lone[i].excess = std::sqrt(then * here / product);
+    lone[i].alone = std::min(now.first, past.first) > kAlone * reach;
+  });
+  return lone;
 }
 
 void WeatherFilter::remember(const Pose& world_from_body) {

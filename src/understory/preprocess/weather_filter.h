@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -20,7 +21,7 @@ struct WeatherFilterConfig {
   bool enabled = false;
   // A return is weather where its distance from others, as a share of its range, is above this
   // times its brightness.
-  double apart = 0.125;
+  double apart = 0.119;
   double reach = 0.05;  // share of its range beyond which a return is alone
   int scans = 2;        // before this one, in which what stands still must have been seen
 };
@@ -57,7 +58,15 @@ class WeatherFilter {
     std::vector<float> range;
     RangeGrid grid;
   };
+  // What one return is, before those around it are asked.
+  struct Lone {
+    float excess = 0.0F;  // sqrt(s b) over the least that is weather amid weather; 0: it is below 1
+    bool alone = false;   // nothing near it in any scan
+  };
   void look(const BodyCloud& cloud);
+  [[nodiscard]] std::vector<Lone> find_lone(
+      const BodyCloud& cloud, float bright,
+      const std::vector<Eigen::Isometry3f>& past_from_body) const;
   [[nodiscard]] std::vector<std::uint8_t> judge(const BodyCloud& cloud,
                                                 const Pose& world_from_body) const;
 

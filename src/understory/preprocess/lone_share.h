@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace understory {
+
+// Which share of the returns around one stands alone, far enough away. Weather comes in patches:
+// where a laser is too cold, where beams look into the sun, or where snow falls off a branch, many
+// of a beam's neighbours see something that stands alone. Immutable, thread-safe.
+class LoneShare {
+ public:
+  // One entry a return, the same number in each: its ring, its time within the scan, its range in
+  // metres, and 1 where it stands alone. Any order.
+  LoneShare(const std::vector<std::uint16_t>& ring, const std::vector<std::uint32_t>& t_ns,
+            const std::vector<float>& range, const std::vector<std::uint8_t>& alone);
+
+  // Share of the returns around return `i` that stand alone, 0..1. Of those that do only the ones
+  // count that are not much nearer than itself: by powers of two, one below its own at least. A
+  // flake close by says nothing about what is far behind it. Around are its ring and two on either
+  // side, and a fortieth of the scan before and after in time. Itself does not count.
+  [[nodiscard]] double around(std::size_t i) const;
+
+ private:
+  static constexpr int kColumns = 180;  // of a scan in time
+  static constexpr int kOctaves = 9;    // of range; the first is up to 0.9 m
+  struct Cell {
+    std::uint32_t all = 0;
+    std::uint32_t alone[kOctaves] = {};  // at least as far as the octave
+  };
+  struct Place {
+    std::uint16_t row = 0;
+    std::uint8_t column = 0;
+    std::uint8_t octave = 0;
+  };
+  std::vector<Place> places_;  // of the returns
+  std::vector<std::uint8_t> alone_;
+  std::vector<std::uint16_t> ring_;  // of the rows, increasing
+  std::vector<Cell> before_;         // kColumns + 1 a row: sums over the columns before
+};
+
+}  // namespace understory
