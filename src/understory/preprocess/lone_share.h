@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace understory {
@@ -12,14 +13,15 @@ namespace understory {
 class LoneShare {
  public:
   // One entry a return, the same number in each: its ring, its time within the scan, its range in
-  // metres, and 1 where it stands alone. Any order.
+  // metres, and 1 where it stands alone. Any order. They must outlive it.
   LoneShare(const std::vector<std::uint16_t>& ring, const std::vector<std::uint32_t>& t_ns,
             const std::vector<float>& range, const std::vector<std::uint8_t>& alone);
 
   // Share of the returns around return `i` that stand alone, 0..1. Of those that do only the ones
   // count that are not much nearer than itself: by powers of two, one below its own at least. A
   // flake close by says nothing about what is far behind it. Around are its ring and two on either
-  // side, and a fortieth of the scan before and after in time. Itself does not count.
+  // side, and the 20 degrees before and after it of a scan that is one revolution: times count, in
+  // 180 columns. Itself does not count.
   [[nodiscard]] double around(std::size_t i) const;
 
  private:
@@ -29,15 +31,19 @@ class LoneShare {
     std::uint32_t all = 0;
     std::uint32_t alone[kOctaves] = {};  // at least as far as the octave
   };
-  struct Place {
-    std::uint16_t row = 0;
-    std::uint8_t column = 0;
-    std::uint8_t octave = 0;
-  };
-  std::vector<Place> places_;  // of the returns
-  std::vector<std::uint8_t> alone_;
-  std::vector<std::uint16_t> ring_;  // of the rows, increasing
-  std::vector<Cell> before_;         // kColumns + 1 a row: sums over the columns before
+  [[nodiscard]] int row_of(std::size_t i) const { return row_of_ring_[ring_[i]]; }
+  [[nodiscard]] int column_of(std::size_t i) const;
+  [[nodiscard]] int octave_of(std::size_t i) const;
+
+  std::span<const std::uint16_t> ring_;
+  std::span<const std::uint32_t> t_ns_;
+  std::span<const float> range_;
+  std::span<const std::uint8_t> alone_;
+  std::uint32_t first_ns_ = 0;
+  float columns_a_ns_ = 0.0F;
+  std::vector<std::uint16_t> ring_of_row_;  // those that occur, increasing
+  std::vector<std::uint16_t> row_of_ring_;
+  std::vector<Cell> before_;  // kColumns + 1 a row: sums over the columns before
 };
 
 }  // namespace understory

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <vector>
 
 #include "understory/util/random.h"
@@ -58,7 +61,8 @@ TEST(LoneShare, IsTheShareOfThoseAroundThatAreNotMuchNearer) {
     int alone = 0;
     for (std::size_t j = 0; j < returns.ring.size(); ++j) {
       if (j == i || std::abs(returns.ring[j] - returns.ring[i]) > 2) continue;
-      if (std::abs(column_of(returns.t_ns[j]) - column_of(returns.t_ns[i])) > 4) continue;
+        const int columns = std::abs(column_of(returns.t_ns[j]) - column_of(returns.t_ns[i]));
+      if (std::min(columns, 180 - columns) > 10) continue;
       ++all;
       if (octave_of(returns.range[j]) >= octave_of(returns.range[i]) - 1) alone += returns.alone[j];
     }
@@ -68,15 +72,17 @@ TEST(LoneShare, IsTheShareOfThoseAroundThatAreNotMuchNearer) {
 }
 
 TEST(LoneShare, AReturnByItselfHasNoneAround) {
-  const LoneShare one({5}, {0}, {3.0F}, {1});
-  EXPECT_EQ(one.around(0), 0.0);
-  const LoneShare none({}, {}, {}, {});
+  const Returns one = {{5}, {0}, {3.0F}, {1}};
+  EXPECT_EQ(share_of(one).around(0), 0.0);
+  const Returns none;
+  share_of(none);
 }
 
 // A source without times for its points, and a range that is no number.
 TEST(LoneShare, WithoutTimesTheRingsTell) {
-  const LoneShare share({0, 0, 0, 9}, {0, 0, 0, 0}, {3.0F, std::nanf(""), 3.0F, 3.0F},
-                        {0, 1, 1, 1});
+  const Returns returns = {
+      {0, 0, 0, 9}, {0, 0, 0, 0}, {0.3F, std::nanf(""), 0.3F, 0.3F}, {0, 1, 1, 1}};
+  const LoneShare share = share_of(returns);
   EXPECT_DOUBLE_EQ(share.around(0), 1.0);
   EXPECT_DOUBLE_EQ(share.around(2), 0.5);
   EXPECT_EQ(share.around(3), 0.0);

@@ -1,7 +1,9 @@
 #include "understory/preprocess/range_grid.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 namespace understory {
 namespace {
@@ -16,8 +18,14 @@ int step_of(int cell) {
 
 }  // namespace
 
+// The exponent of the number: std::ilogb takes longer.
+int RangeGrid::octave_of(float range) {
+  const auto bits = std::bit_cast<std::uint32_t>(unit(std::max(0.0F, range)));
+  return static_cast<int>(bits >> 23U) - 127;
+}
+
 int RangeGrid::level_of(float range) {
-  return std::clamp(std::ilogb(unit(std::max(range, 0.0F))) + kNearestLevel + 1, 0, kLevels - 1);
+  return std::clamp(octave_of(range) + kNearestLevel + 1, 0, kLevels - 1);
 }
 
 RangeGrid::RangeGrid(const Points& points, const std::vector<float>& range, double reach,
@@ -47,12 +55,14 @@ void RangeGrid::add(int level, const Eigen::Vector3f& place, std::uint32_t point
   cells.first.set(key, entry);
 }
 
+float RangeGrid::Nearest::apart() const { return std::cbrt(first * first * second); }
+
 RangeGrid::Nearest RangeGrid::nearest(const Eigen::Vector3f& place, float range, float enough,
                                       std::uint32_t but) const {
   static_assert(VoxelIndex::kNone == kNoPoint);
   const Level& cells = levels_[static_cast<std::size_t>(level_of(range))];
   const float metres = unit(range);
-  const float stop = enough * metres;
+  const float stop2 = enough * metres * enough * metres;
   float first2 = reach_ * reach_ * metres * metres;
   float second2 = first2;
   const int x = voxel_floor(place.x() / cells.side_m);
@@ -67,7 +77,7 @@ RangeGrid::Nearest RangeGrid::nearest(const Eigen::Vector3f& place, float range,
       second2 = std::min(second2, std::max(first2, distance2));
       first2 = std::min(first2, distance2);
     }
-    if (first2 <= stop * stop) break;
+    if (first2 * first2 * second2 <= stop2 * stop2 * stop2) break;
   }
   return {std::sqrt(first2) / metres, std::sqrt(second2) / metres};
 }

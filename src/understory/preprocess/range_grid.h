@@ -26,13 +26,18 @@ class RangeGrid {
   struct Nearest {
     float first = 0.0F;
     float second = 0.0F;
+    // What counts as the distance of both: cbrt(first^2 second).
+    [[nodiscard]] float apart() const;
   };
-  // From a place. Ends early with larger values, as soon as `first` is found not to be above
+  // From a place. Ends early with larger distances, as soon as `apart` of them is not above
   // `enough`. `range`: of the place from the lidar; `but`: a point that does not count.
   [[nodiscard]] Nearest nearest(const Eigen::Vector3f& place, float range, float enough,
                                 std::uint32_t but = kNoPoint) const;
   // What distances are a share of, metres: the errors of a lidar do not vanish close by.
   [[nodiscard]] static float unit(float range) { return 0.1F + range; }
+
+  // Floor of the binary logarithm of `unit(range)`; a range below 0 or none counts as 0.
+  [[nodiscard]] static int octave_of(float range);
 
  private:
   static constexpr int kLevels = 16;

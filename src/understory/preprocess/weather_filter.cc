@@ -28,15 +28,6 @@ float bright_of(std::vector<float> intensity) {
   return intensity[static_cast<std::size_t>(at)];
 }
 
-// How far apart from others, by the nearest of them and the second nearest: one may be there by
-// chance.
-float apart_of(const RangeGrid::Nearest& nearest) {
-  return std::cbrt(nearest.first * nearest.first * nearest.second);
-}
-
-// The distance of the nearest at which `apart_of` is `apart`, with this one of the second nearest.
-float enough(float apart, float second) { return std::sqrt(apart * apart * apart / second); }
-
 // 1 where the return before or the one after on the ring is about as far: within this share of it.
 std::vector<std::uint8_t> continuing(const BodyCloud& cloud, float within) {
   constexpr std::uint32_t kNone = UINT32_MAX;
@@ -129,21 +120,18 @@ std::vector<std::uint8_t> WeatherFilter::judge(const BodyCloud& cloud,
     past_from_body.back().linear() = pose.rotation_matrix().cast<float>();
     past_from_body.back().translation() = pose.translation().cast<float>();
   }
-  const std::vector<Lone> lone = find_lone(cloud, bright, past_from_body);
-  std::vector<std::uint8_t> alone(cloud.size());
-  for (std::size_t i = 0; i < lone.size(); ++i)
-    alone[i] = lone[i].alone ? 1 : 0;
-  const LoneShare share(cloud.ring, cloud.t_ns, cloud.range, alone);
+  const Lone lone = find_lone(cloud, bright, past_from_body);
+  const LoneShare share(cloud.ring, cloud.t_ns, cloud.range, lone.alone);
   parallel_for(cloud.size(), kGrain, [&](std::size_t i) {
-    if (lone[i].excess > 0.0F && lone[i].excess * expected(share.around(i)) > 1.0) keep[i] = 0;
+    if (lone.excess[i] > 0.0F && lone.excess[i] * expected(share.around(i)) > 1.0) keep[i] = 0;
   });
   return keep;
 }
 
-std::vector<WeatherFilter::Lone> WeatherFilter::find_lone(
+WeatherFilter::Lone WeatherFilter::find_lone(
     const BodyCloud& cloud, float bright,
     const std::vector<Eigen::Isometry3f>& past_from_body) const {
-  std::vector<Lone> lone(cloud.size());
+  Lone lone{std::vector<float>(cloud.size(), 0.0F), std::vector<std::uint8_t>(cloud.size(), 0)};
   const auto reach = static_cast<float>(config_.reach);
   const auto apart = static_cast<float>(config_.apart);
   const std::vector<std::uint8_t> continues = continuing(cloud, reach);
@@ -155,8 +143,8 @@ std::vector<WeatherFilter::Lone> WeatherFilter::find_lone(
     const float product = least * least;
     if (!(product < reach * reach)) return;
     const RangeGrid::Nearest now = now_.grid.nearest(
-        cloud.points[i], range, enough(product / reach, reach), static_cast<std::uint32_t>(i));
-    const float here = apart_of(now);
+        cloud.points[i], range, product / reach, static_cast<std::uint32_t>(i));
+    const float here = now.apart();
     if (here * reach <= product) return;
     RangeGrid::Nearest past = before_.empty() ? now : RangeGrid::Nearest{reach, reach};
     for (std::size_t k = 0; k < before_.size(); ++k) {
@@ -164,14 +152,14 @@ std::vector<WeatherFilter::Lone> WeatherFilter::find_lone(
       const Eigen::Vector3f place =
           cloud.is_carried(i) ? cloud.points[i] : past_from_body[k] * cloud.points[i];
       const RangeGrid::Nearest seen =
-          before_[k].grid.nearest(place, range, enough(product / here, past.second));
+          before_[k].grid.nearest(place, range, product / here);
       past = {std::min(past.first, seen.first), std::min(past.second, seen.second)};
-      if (apart_of(past) * here <= product) return;
+      if (past.apart() * here <= product) return;
     }
-    const float then = apart_of(past);
+    const float then = past.apart();
     if (then * here <= product) return;
-    lone[i].excess = std::sqrt(then * here / product);
-    lone[i].alone = std::min(now.first, past.first) > kAlone * reach;
+    lone.excess[i] = std::sqrt(then * here / product);
+    lone.alone[i] = std::min(now.first, past.first) > kAlone * reach ? 1 : 0;
   });
   return lone;
 }

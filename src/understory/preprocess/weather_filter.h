@@ -58,13 +58,13 @@ class WeatherFilter {
     std::vector<float> range;
     RangeGrid grid;
   };
-  // What one return is, before those around it are asked.
+  // What the returns are before those around them are asked, one entry each.
   struct Lone {
-    float excess = 0.0F;  // sqrt(s b) over the least that is weather amid weather; 0: it is below 1
-    bool alone = false;   // nothing near it in any scan
+    std::vector<float> excess;  // sqrt(s b) over the least that is weather amid weather; 0: below 1
+    std::vector<std::uint8_t> alone;  // 1: nothing near it in any scan
   };
   void look(const BodyCloud& cloud);
-  [[nodiscard]] std::vector<Lone> find_lone(
+  [[nodiscard]] Lone find_lone(
       const BodyCloud& cloud, float bright,
       const std::vector<Eigen::Isometry3f>& past_from_body) const;
   [[nodiscard]] std::vector<std::uint8_t> judge(const BodyCloud& cloud,

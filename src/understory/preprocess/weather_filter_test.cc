@@ -3,10 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
+#include "understory/preprocess/lone_share.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
@@ -129,27 +133,64 @@ BodyCloud cloud_of_random_ranges(std::uint64_t seed) {
   return cloud;
 }
 
-// Distance to the nearest by trying all, over 0.1 m + range, at most the reach.
-double share(const BodyCloud& among, const Vector3f& place, double range, std::size_t but) {
-  double nearest = 0.05;
+// Distances to the nearest and the second nearest by trying all, over 0.1 m + range, at most the
+// reach.
+std::array<double, 2> shares(const BodyCloud& among, const Vector3f& place, double range,
+                             std::size_t but) {
+  std::array<double, 2> nearest = {0.05, 0.05};
   for (std::size_t i = 0; i < among.size(); ++i) {
     if (i == but) continue;
-    nearest = std::min(nearest, double((among.points[i] - place).norm()) / (0.1 + range));
+    const double share = double((among.points[i] - place).norm()) / (0.1 + range);
+    if (share < nearest[0]) {
+      nearest = {share, nearest[0]};
+    } else {
+      nearest[1] = std::min(nearest[1], share);
+    }
   }
   return nearest;
+}
+
+double apart(const std::array<double, 2>& nearest) {
+  return std::cbrt(nearest[0] * nearest[0] * nearest[1]);
+}
+
+// Whether a neighbour on the ring is about as far: the clouds have 16 rings in turn.
+bool continues(const BodyCloud& cloud, std::size_t i) {
+  const double within = 0.05 * (0.1 + cloud.range[i]);
+  const auto near = [&](std::size_t j) {
+    return std::abs(double(cloud.range[j]) - cloud.range[i]) <= within;
+  };
+  return (i >= 16 && near(i - 16)) || (i + 16 < cloud.size() && near(i + 16));
+}
+
+// sqrt(s b) (range / 10 m)^0.16 over 0.119 (i + 0.02), and 1 where nothing is near.
+std::pair<std::vector<double>, std::vector<std::uint8_t>> excess_of(const BodyCloud& now,
+                                                                    const BodyCloud& before) {
+  std::vector<float> sorted = now.intensity;
+  std::sort(sorted.begin(), sorted.end());
+  const double bright = sorted[static_cast<std::size_t>(0.9 * (sorted.size() - 1.0))];
+  std::vector<double> excess;
+  std::vector<std::uint8_t> alone;
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    const auto s = shares(now, now.points[i], now.range[i], i);
+    const auto b = shares(before, now.points[i], now.range[i], before.size());
+    excess.push_back(std::sqrt(apart(s) * apart(b)) * std::pow((0.1 + now.range[i]) / 10.0, 0.16) /
+                     (0.119 * (now.intensity[i] / bright + 0.02)) /
+                     (continues(now, i) ? 1.2 : 1.0));
+    alone.push_back(excess.back() > 1.0 && std::min(s[0], b[0]) > 0.04 ? 1 : 0);
+  }
+  return {excess, alone};
 }
 
 TEST(WeatherFilter, IsTheRuleOverAllPoints) {
   const BodyCloud before = cloud_of_random_ranges(3);
   const BodyCloud now = cloud_of_random_ranges(4);
-  std::vector<float> sorted = now.intensity;
-  std::sort(sorted.begin(), sorted.end());
-  const double bright = sorted[static_cast<std::size_t>(0.9 * 2999.0)];
+  const auto [excess, alone] = excess_of(now, before);
+  const LoneShare share(now.ring, now.t_ns, now.range, alone);
   std::vector<std::uint32_t> expected;
   for (std::size_t i = 0; i < now.size(); ++i) {
-    const double s = share(now, now.points[i], now.range[i], i);
-    const double b = share(before, now.points[i], now.range[i], before.size());
-    if (std::sqrt(s * b) <= 0.125 * (now.intensity[i] / bright + 0.02))
+    const double around = std::min((share.around(i) + 0.0057) / 0.037, 1.0);
+    if (excess[i] <= 1.0 || excess[i] * std::pow(around, 0.54) <= 1.0)
       expected.push_back(now.t_ns[i]);
   }
   for (const int threads : {1, 4}) {
@@ -164,6 +205,46 @@ TEST(WeatherFilter, IsTheRuleOverAllPoints) {
     EXPECT_EQ(cloud.t_ns, expected);
     EXPECT_GT(cloud.size(), 500U);
     EXPECT_LT(cloud.size(), 2900U);
+  }
+}
+
+// A dark return off a wall by a little, and false ranges in the air around it or not: it is weather
+// where there is weather.
+TEST(WeatherFilter, IsStricterWhereOthersStandAlone) {
+  for (const bool weather : {true, false}) {
+    BodyCloud cloud = wall();
+    if (weather) {
+      for (int i = 0; i < 60; ++i) {
+        const auto step = static_cast<float>(i);
+        add_point(cloud, {20.0F + 2.0F * step, 3.0F * step, 5.0F}, 8.0F);
+      }
+    }
+    const auto of_all = static_cast<std::uint32_t>(cloud.size());
+    add_point(cloud, {9.65F, 0.0F, 0.0F}, 6.0F);
+    WeatherFilter filter(switched_on());
+    filter.drop(cloud, Pose());
+    EXPECT_EQ(cloud.t_ns.back() == of_all, !weather);
+  }
+}
+
+// A part of the machine is at the same place seen from the lidar, and moves through the world.
+TEST(WeatherFilter, WhatGoesAlongStaysWhereItIsBesideTheLidar) {
+  const Vector3f rail(1.0F, 0.3F, -0.2F);
+  const Pose then(Eigen::Quaterniond::Identity(), Eigen::Vector3d(-0.4, 0.0, 0.0));
+  for (const bool carried : {true, false}) {
+    WeatherFilter filter(switched_on());
+    BodyCloud first = moved(wall(), then.inverse());
+    add_point(first, rail, 8.0F);
+    add_point(first, rail + Vector3f(0.0F, 0.01F, 0.0F), 8.0F);
+    filter.drop(first, then);
+    filter.remember(then);
+    BodyCloud second = wall();
+    const std::size_t of_wall = second.size();
+    add_point(second, rail, 8.0F);
+    second.carried.assign(second.size(), 0);
+    second.carried.back() = carried ? 1 : 0;
+    filter.drop(second, Pose());
+    EXPECT_EQ(second.size(), of_wall + (carried ? 1U : 0U));
   }
 }
 
