@@ -61,7 +61,7 @@ TEST(LoneShare, IsTheShareOfThoseAroundThatAreNotMuchNearer) {
     int alone = 0;
     for (std::size_t j = 0; j < returns.ring.size(); ++j) {
       if (j == i || std::abs(returns.ring[j] - returns.ring[i]) > 2) continue;
-        const int columns = std::abs(column_of(returns.t_ns[j]) - column_of(returns.t_ns[i]));
+      const int columns = std::abs(column_of(returns.t_ns[j]) - column_of(returns.t_ns[i]));
       if (std::min(columns, 180 - columns) > 10) continue;
       ++all;
       if (octave_of(returns.range[j]) >= octave_of(returns.range[i]) - 1) alone += returns.alone[j];

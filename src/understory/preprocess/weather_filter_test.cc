@@ -208,22 +208,21 @@ TEST(WeatherFilter, IsTheRuleOverAllPoints) {
   }
 }
 
-// A dark return off a wall by a little, and false ranges in the air around it or not: it is weather
-// where there is weather.
+// A dark return off a wall by a little, with false ranges in the air behind it or not: it is
+// weather where there is weather.
 TEST(WeatherFilter, IsStricterWhereOthersStandAlone) {
   for (const bool weather : {true, false}) {
     BodyCloud cloud = wall();
-    if (weather) {
-      for (int i = 0; i < 60; ++i) {
-        const auto step = static_cast<float>(i);
-        add_point(cloud, {20.0F + 2.0F * step, 3.0F * step, 5.0F}, 8.0F);
-      }
+    for (int i = 0; i < 60; ++i) {  // 2 m apart
+      const float azimuth = 0.1F * static_cast<float>(i);
+      add_point(cloud, {20.0F * std::cos(azimuth), 20.0F * std::sin(azimuth), 5.0F},
+                weather ? 8.0F : 100.0F);
     }
-    const auto of_all = static_cast<std::uint32_t>(cloud.size());
-    add_point(cloud, {9.65F, 0.0F, 0.0F}, 6.0F);
+    const auto number = static_cast<std::uint32_t>(cloud.size());
+    add_point(cloud, {9.8F, 0.0F, 0.0F}, 6.0F);
     WeatherFilter filter(switched_on());
-    filter.drop(cloud, Pose());
-    EXPECT_EQ(cloud.t_ns.back() == of_all, !weather);
+    EXPECT_EQ(filter.drop(cloud, Pose()), weather ? 61U : 0U);
+    EXPECT_EQ(cloud.t_ns.back() == number, !weather);
   }
 }
 
