@@ -3,8 +3,8 @@
 //   counts
 // APART, SCANS: settings preprocess.weather.apart and .scans. Prints: weather, of these dropped,
 // others, of these dropped, of these by drop_isolated (which is always on). Returns of the first
-// second do not count: no scans before them tell. The poses are the true ones. Returns that go along
-// with the lidar are marked as the odometry marks them.
+// second do not count: no scans before them tell. The poses are the true ones. Returns that go
+// along with the lidar are marked as the odometry marks them.
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <cstdio>
@@ -39,8 +39,8 @@ Eigen::Isometry3d world_from_lidar(const Scan& scan, const std::vector<TruePoint
   Eigen::Matrix3Xd true_places(3, n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const std::size_t at = static_cast<std::size_t>(i) * kEach;
-    measured.col(i) = Eigen::Vector3f(scan.points[at].x, scan.points[at].y, scan.points[at].z)
-                          .cast<double>();
+    measured.col(i) =
+        Eigen::Vector3f(scan.points[at].x, scan.points[at].y, scan.points[at].z).cast<double>();
     true_places.col(i) = truth[at].place;
   }
   return Eigen::Isometry3d(Eigen::umeyama(measured, true_places, false));
@@ -48,7 +48,8 @@ Eigen::Isometry3d world_from_lidar(const Scan& scan, const std::vector<TruePoint
 
 // The points at their true places, in the frame of the lidar. `from`: their numbers in the scan.
 BodyCloud cloud_of(const Scan& scan, const std::vector<TruePoint>& truth,
-                   const std::vector<std::size_t>& from, const Eigen::Isometry3d& world_from_lidar) {
+                   const std::vector<std::size_t>& from,
+                   const Eigen::Isometry3d& world_from_lidar) {
   const Eigen::Isometry3d lidar_from_world = world_from_lidar.inverse();
   BodyCloud cloud;
   for (const std::size_t i : from) {

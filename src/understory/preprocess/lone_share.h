@@ -8,8 +8,8 @@
 namespace understory {
 
 // Which share of the returns around one stands alone, far enough away. Weather comes in patches:
-// where a laser is too cold, where beams look into the sun, or where snow falls off a branch, many
-// of a beam's neighbours see something that stands alone. Immutable, thread-safe.
+// where a laser is too cold, where beams look into the sun, or where snow falls off a branch. Many
+// of a beam's neighbours there see something that stands alone. Immutable, thread-safe.
 class LoneShare {
  public:
   // One entry a return, the same number in each: its ring, its time within the scan, its range in
@@ -17,11 +17,10 @@ class LoneShare {
   LoneShare(const std::vector<std::uint16_t>& ring, const std::vector<std::uint32_t>& t_ns,
             const std::vector<float>& range, const std::vector<std::uint8_t>& alone);
 
-  // Share of the returns around return `i` that stand alone, 0..1. Of those that do only the ones
-  // count that are not much nearer than itself: by powers of two, one below its own at least. A
+  // Share of the returns around return `i` that stand alone, 0..1. Itself does not count. Of those
+  // alone only the ones count that are not much nearer: one power of two below its own at least. A
   // flake close by says nothing about what is far behind it. Around are its ring and two on either
-  // side, and the 20 degrees before and after it of a scan that is one revolution: times count, in
-  // 180 columns. Itself does not count.
+  // side. In time it is 10 columns of 180 before and after: 20 degrees of a revolution.
   [[nodiscard]] double around(std::size_t i) const;
 
  private:

@@ -75,27 +75,29 @@ namespace weather_filter {  // preprocess/weather_filter.cc
 inline constexpr double kBrightShare = 0.9;
 // Added to brightness: a black return needs some distance too [tuned: as above]
 inline constexpr float kDarkest = 0.02F;
-// Range at which `apart` holds as it stands, metres, and the power of range over it by which less
-// is weather farther away: false ranges come from anywhere, what is there is mostly near [tuned:
-// skidoo, lake, tuusniemi1, harvester, seeds 3, 5, 7]
+// Range at which `apart` holds as it stands, metres [chosen: in the middle of what is seen]
 inline constexpr float kUsualRangeM = 10.0F;
+// Power of the range over that one by which less is needed farther away. False ranges come from
+// anywhere, what is there is mostly near [tuned: skidoo, lake, tuusniemi1, harvester, seeds 3, 5,
+// 7]
 inline constexpr float kByRange = 0.16F;
-// Share of the reach within which a return has nothing near, in its scan and in those before, if
-// it stands alone [chosen]
+// Share of the range within which a return that stands alone has nothing near, over the reach
+// [chosen]
 inline constexpr float kAlone = 0.8F;
-// Share of the returns around one, from which on all are that stand alone, if there is weather
-// [tuned: as above]
+// Share of the returns around one that stand alone, from which on there is weather [tuned: as
+// above]
 inline constexpr double kLoneInWeather = 0.037;
 // Added to that share: some stand alone in clear weather too [tuned: as above]
 inline constexpr double kLoneAnywhere = 0.0057;
-// Times as far from others is what a beam's neighbours on the ring go on with [tuned: as above]
-inline constexpr float kContinues = 1.2F;
-// Power of that share by which a return must be farther from others where less weather is [tuned:
-// as above]
+// Power of that share by which a return must be farther from others where there is less weather
+// [tuned: as above]
 inline constexpr double kByLoneShare = 0.54;
-// Rings on either side, and columns of a scan before and after (180 of them), that are around a
-// return [tuned: as above]
+// How many times as far from others it must be where a neighbour on the ring goes on with it
+// [tuned: as above]
+inline constexpr float kContinues = 1.2F;
+// Rings on either side that are around a return [tuned: as above]
 inline constexpr int kRingsAround = 2;
+// Columns of a scan before and after it that are around a return, of 180 [tuned: as above]
 inline constexpr int kColumnsAround = 10;
 // How far the lidar may have moved between a scan and those before it, metres. A return that is
 // nearer than some times that is then looked for in vain [chosen: 5 m/s at 10 Hz]

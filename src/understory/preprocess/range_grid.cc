@@ -55,7 +55,9 @@ void RangeGrid::add(int level, const Eigen::Vector3f& place, std::uint32_t point
   cells.first.set(key, entry);
 }
 
-float RangeGrid::Nearest::apart() const { return std::cbrt(first * first * second); }
+float RangeGrid::Nearest::apart() const {
+  return std::cbrt(first * first * second);
+}
 
 RangeGrid::Nearest RangeGrid::nearest(const Eigen::Vector3f& place, float range, float enough,
                                       std::uint32_t but) const {

@@ -44,8 +44,7 @@ std::vector<std::uint8_t> continuing(const BodyCloud& cloud, float within) {
   return continues;
 }
 
-// How far a return may be doubted where a share of those around it stands alone, 0..1: the more of
-// them, the sooner it is weather itself.
+// Weight of what speaks for weather, 0..1, by the share of those around that stand alone.
 double expected(double share) {
   return std::pow(std::min((share + kLoneAnywhere) / kLoneInWeather, 1.0), kByLoneShare);
 }
@@ -142,8 +141,8 @@ WeatherFilter::Lone WeatherFilter::find_lone(
                         (continues[i] != 0 ? kContinues : 1.0F);
     const float product = least * least;
     if (!(product < reach * reach)) return;
-    const RangeGrid::Nearest now = now_.grid.nearest(
-        cloud.points[i], range, product / reach, static_cast<std::uint32_t>(i));
+    const RangeGrid::Nearest now =
+        now_.grid.nearest(cloud.points[i], range, product / reach, static_cast<std::uint32_t>(i));
     const float here = now.apart();
     if (here * reach <= product) return;
     RangeGrid::Nearest past = before_.empty() ? now : RangeGrid::Nearest{reach, reach};
@@ -151,8 +150,7 @@ WeatherFilter::Lone WeatherFilter::find_lone(
       // What goes along with the lidar was where it is now, seen from there.
       const Eigen::Vector3f place =
           cloud.is_carried(i) ? cloud.points[i] : past_from_body[k] * cloud.points[i];
-      const RangeGrid::Nearest seen =
-          before_[k].grid.nearest(place, range, product / here);
+      const RangeGrid::Nearest seen = before_[k].grid.nearest(place, range, product / here);
       past = {std::min(past.first, seen.first), std::min(past.second, seen.second)};
       if (past.apart() * here <= product) return;
     }

@@ -19,8 +19,8 @@ namespace understory {
 // sun. P3 shows it in figure 6 II and the lessons below it.
 struct WeatherFilterConfig {
   bool enabled = false;
-  // A return is weather where its distance from others, as a share of its range, is above this
-  // times its brightness.
+  // Where there is weather, a return is one where its distance from others, as a share of its
+  // range, is above this times its brightness.
   double apart = 0.119;
   double reach = 0.05;  // share of its range beyond which a return is alone
   int scans = 2;        // before this one, in which what stands still must have been seen
@@ -29,12 +29,16 @@ void describe(ConfigTable& table, WeatherFilterConfig& config);
 
 // Takes returns out of a scan that are dark and stand alone, in their scan and in those before it.
 // A wall, a stem or the ground is in the scan before too; a flake is not.
-//   s  distance to the nearest return of the same scan, over 0.1 m + range, at most `reach`
-//   b  the same to the nearest return of the scans before
+//   s  distance to the others of the same scan, over 0.1 m + range, at most `reach`:
+//      cbrt(d1^2 d2) of the nearest and the second nearest
+//   b  the same to those of the scans before
 //   i  intensity over that of the bright returns: nine of ten are darker
-// A return goes where sqrt(s b) > apart (i + 0.02). Bright returns thus never go. Without
-// intensities (all the same) nothing goes. One scan after another; not thread-safe, parallel
-// inside, the same result for any number of threads.
+//   w  weight by the share of the returns around that stand alone (LoneShare), at most 1
+// A return goes where sqrt(s b) w (range / 10 m)^0.16 > apart (i + 0.02). It must be 1.2 times as
+// far where a neighbour on its ring goes on with it. Bright returns thus never go. What goes along
+// with the lidar is looked up where it is, seen from there. Without intensities (all the same)
+// nothing goes. One scan after another; not thread-safe, parallel inside, the same result for any
+// number of threads. The constants are ours (preprocess_constants.h): P3 names no filter.
 class WeatherFilter {
  public:
   explicit WeatherFilter(const WeatherFilterConfig& config) : config_(config) {}
@@ -64,9 +68,8 @@ class WeatherFilter {
     std::vector<std::uint8_t> alone;  // 1: nothing near it in any scan
   };
   void look(const BodyCloud& cloud);
-  [[nodiscard]] Lone find_lone(
-      const BodyCloud& cloud, float bright,
-      const std::vector<Eigen::Isometry3f>& past_from_body) const;
+  [[nodiscard]] Lone find_lone(const BodyCloud& cloud, float bright,
+                               const std::vector<Eigen::Isometry3f>& past_from_body) const;
   [[nodiscard]] std::vector<std::uint8_t> judge(const BodyCloud& cloud,
                                                 const Pose& world_from_body) const;
 

@@ -208,8 +208,7 @@ TEST(WeatherFilter, IsTheRuleOverAllPoints) {
   }
 }
 
-// A dark return off a wall by a little, with false ranges in the air behind it or not: it is
-// weather where there is weather.
+// A dark return off a wall by a little. It is weather where there are false ranges in the air.
 TEST(WeatherFilter, IsStricterWhereOthersStandAlone) {
   for (const bool weather : {true, false}) {
     BodyCloud cloud = wall();
