@@ -124,8 +124,24 @@ TEST(NotATree, AnEndRightBelowFoliageMayBeHiddenByIt) {
   Scene scene;
   scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
   add_tree_behind(scene);
-  scene.add_thicket(0.3, 1.7, 2.2, 200);
+  scene.add_column(0.0, 0.0, 0.2, 1.7, 2.3);  // it hides what stands within
   EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
+}
+
+TEST(NotATree, AStemThatGoesOnShiftedIsATree) {
+  Scene scene;
+  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
+  add_tree_behind(scene);
+  scene.add_column(0.2, 0.0, 0.06, 1.6, 3.5);
+  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
+}
+
+TEST(NotATree, APostWithinFoliageEndsWhereTheFoliageGoesOn) {
+  Scene scene;
+  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
+  add_tree_behind(scene);
+  scene.add_column(0.0, 0.0, 0.2, 0.5, 3.5);
+  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kEndsLow);
 }
 
 TEST(NotATree, AYoungTreeWithinFoliageMayEndLow) {
