@@ -61,8 +61,8 @@ class SeenSides {
 
 // The half metre below the end of a stem, and the one above it.
 struct AtEnd {
-  int below = 0;        // on the surface
-  int above = 0;        // where the stem would go on
+  int below = 0;         // on the surface
+  int above = 0;         // where the stem would go on
   int beside_below = 0;  // beside it, by up to kNearAxis
   int beside_above = 0;
   SeenSides sides;
@@ -205,8 +205,7 @@ bool part_of_plane(const StemFit& stem, const PointsNear& near) {
 }  // namespace
 
 TreeDoubt doubt_of(const StemFit& stem, const PointsNear& near, const StemDetectorConfig& config) {
-  if (ends_low(stem, near, config) || ends_suddenly(stem, near, config))
-    return TreeDoubt::kEndsLow;
+  if (ends_low(stem, near, config) || ends_suddenly(stem, near, config)) return TreeDoubt::kEndsLow;
   if (part_of_plane(stem, near)) return TreeDoubt::kPartOfPlane;
   return TreeDoubt::kNone;
 }
