@@ -198,7 +198,8 @@ inline constexpr double kGoesOn = 0.05;
 // Of the points on the last half metre of a stem: so many more beside it above the end hide no stem
 // [chosen: to hide it takes about as many]
 inline constexpr double kMoreBeside = 0.25;
-// m from the axis: points behind a stem that ends suddenly, at most [tuned on `random` 1, 8, 13, 16]
+// m from the axis: points behind a stem that ends suddenly, at most [tuned on `random` 1, 8, 13,
+// 16]
 inline constexpr double kBehindReach = 6.0;
 // Length of the mean direction of the sides that were seen: less, and they lie all around [chosen:
 // 0.64 is half of a circumference]
