@@ -193,6 +193,20 @@ inline constexpr int kAroundPoints = 40;
 inline constexpr double kLeastExpected = 20.0;
 // Of the points that a stem would have above its end: with more it goes on [tuned on random seeds]
 inline constexpr double kAboveShare = 0.005;
+// m beyond the surface: points above the end of a stem that are its own, if it goes on [chosen]
+inline constexpr double kGoesOn = 0.05;
+// Of the points on the last half metre of a stem: so many more beside it above the end hide no stem
+// [chosen: to hide it takes about as many]
+inline constexpr double kMoreBeside = 0.25;
+// m from the axis: points behind a stem that ends suddenly, at most [tuned on `random` 1, 8, 13,
+// 16]
+inline constexpr double kBehindReach = 6.0;
+// Length of the mean direction of the sides that were seen: less, and they lie all around [chosen:
+// 0.64 is half of a circumference]
+inline constexpr double kOneSided = 0.3;
+// Cosine of the angle to the line of sight within which a place is behind a stem [chosen: 30
+// degrees]
+inline constexpr double kBehindCosine = 0.866;
 // m beyond the surface of a stem from which on a plane is looked for beside it [chosen]
 inline constexpr double kBesideFrom = 0.05;
 // m of such a plane [chosen]

@@ -39,6 +39,86 @@ bool ends_low(const StemFit& stem, const PointsNear& near, const StemDetectorCon
   return expected >= kLeastExpected && around >= kAroundPoints && above <= kAboveShare * expected;
 }
 
+// Which sides of a stem were seen: its surface faces the scanner there.
+class SeenSides {
+ public:
+  void add(const Eigen::Vector3d& outward) {
+    sum_ += outward.head<2>();
+    ++count_;
+  }
+  // Whether beams that pass over the stem go on to `off`, a place relative to its axis: away from
+  // the sides that were seen. Any place does if all sides were seen.
+  [[nodiscard]] bool is_behind(const Eigen::Vector2d& off) const {
+    const double one_sided = sum_.norm() / std::max(1, count_);
+    if (one_sided < kOneSided) return true;
+    return off.dot(sum_) <= -kBehindCosine * off.norm() * sum_.norm();
+  }
+
+ private:
+  Eigen::Vector2d sum_ = Eigen::Vector2d::Zero();
+  int count_ = 0;
+};
+
+// The half metre below the end of a stem, and the one above it.
+struct AtEnd {
+  int below = 0;         // on the surface
+  int above = 0;         // where the stem would go on
+  int beside_below = 0;  // beside it, by up to kNearAxis
+  int beside_above = 0;
+  SeenSides sides;
+
+  // The stem goes on neither straight nor shifted. What stands beside it hides no more of it above
+  // than below: each beam that it stops leaves a point there.
+  [[nodiscard]] bool is_sudden() const {
+    return below >= kLeastExpected && above <= kAboveShare * below &&
+           beside_above <= beside_below + kMoreBeside * below;
+  }
+};
+
+AtEnd look_at_end(const StemFit& stem, const StemAxis& axis, const PointsNear& near) {
+  AtEnd end;
+  const double from = stem.highest_m + kAboveEnd;
+  near(stem.centre, stem.radius_m + kLeanReach + kNearAxis, [&](const SlicePoint& point) {
+    const auto height = static_cast<double>(point.height_m);
+    const bool is_below = height <= stem.highest_m && height > stem.highest_m - kLeastSpan;
+    const bool is_above = height > from && height <= from + kLeastSpan;
+    if (!is_below && !is_above) return;
+    const AxisPlace place = axis.place(point);
+    const double off = place.distance_m - stem.radius_m;
+    if (off > kNearAxis) return;
+    if (off > kGoesOn) {
+      ++(is_below ? end.beside_below : end.beside_above);
+    } else if (is_above) {
+      ++end.above;
+    } else if (std::abs(axis.surface_error(place)) <= kOnSurface) {
+      ++end.below;
+      end.sides.add(place.outward);
+    }
+  });
+  return end;
+}
+
+// A post ends suddenly: its last half metre is well seen, the next one is empty, and things behind
+// it were seen through that. Branches may hang above. A stem that leaves the view shows ever fewer
+// points before. Young trees within foliage do end low.
+bool ends_suddenly(const StemFit& stem, const PointsNear& near, const StemDetectorConfig& config) {
+  const double from = stem.highest_m + kAboveEnd;
+  const double to = from + kLeastSpan;
+  if (stem.in_foliage || stem.highest_m > kLowEnd || config.highest_m < to) return false;
+  const StemAxis axis(stem);
+  const AtEnd end = look_at_end(stem, axis, near);
+  if (!end.is_sudden()) return false;
+  int behind = 0;
+  near(stem.centre, kBehindReach, [&](const SlicePoint& point) {
+    const auto height = static_cast<double>(point.height_m);
+    if (height <= from || height > to) return;
+    const AxisPlace place = axis.place(point);
+    if (place.distance_m - stem.radius_m <= kNotNear || place.distance_m > kBehindReach) return;
+    behind += end.sides.is_behind(place.outward.head<2>()) ? 1 : 0;
+  });
+  return behind >= kAroundPoints;
+}
+
 // The points beside a stem as they lie in one vertical slab through it.
 class Slab {
  public:
@@ -125,7 +205,7 @@ bool part_of_plane(const StemFit& stem, const PointsNear& near) {
 }  // namespace
 
 TreeDoubt doubt_of(const StemFit& stem, const PointsNear& near, const StemDetectorConfig& config) {
-  if (ends_low(stem, near, config)) return TreeDoubt::kEndsLow;
+  if (ends_low(stem, near, config) || ends_suddenly(stem, near, config)) return TreeDoubt::kEndsLow;
   if (part_of_plane(stem, near)) return TreeDoubt::kPartOfPlane;
   return TreeDoubt::kNone;
 }

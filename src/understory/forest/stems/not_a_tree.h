@@ -21,9 +21,10 @@ using PointsNear = std::function<void(const Eigen::Vector2d& centre, double reac
                                       const std::function<void(const SlicePoint&)>& visit)>;
 
 // What the points around a fitted stem say against it, by the numbers of
-// stem_constants::not_a_tree. `near` gives the points that the stem was found in, in its frame:
-// metres, heights above the ground from config.lowest_m to config.highest_m. Without points above a
-// stem's end, near it or around it, nothing is said: they may be out of view.
+// stem_constants::not_a_tree (docs/method/forest.md, Stems). `near` gives the points that the stem
+// was found in, in its frame: metres, heights above the ground from config.lowest_m to
+// config.highest_m. Without points above a stem's end, near it or around it, nothing is said: they
+// may be out of view.
 [[nodiscard]] TreeDoubt doubt_of(const StemFit& stem, const PointsNear& near,
                                  const StemDetectorConfig& config);
 

@@ -37,8 +37,10 @@ class Scene {
       add(random_.uniform(-half_m, half_m), random_.uniform(-half_m, half_m),
           random_.uniform(low, high));
   }
-  [[nodiscard]] TreeDoubt doubt(double radius, double low, double high) const {
+  [[nodiscard]] TreeDoubt doubt(double radius, double low, double high,
+                                bool in_foliage = false) const {
     StemFit stem;
+    stem.in_foliage = in_foliage;
     stem.radius_m = radius;
     stem.lowest_m = low;
     stem.highest_m = high;
@@ -76,6 +78,77 @@ TEST(NotATree, AStemThatIsHiddenFurtherUpIsATree) {
   scene.add_column(0.0, 0.0, 0.06, 2.6, 3.5);  // its fit ended below a branch
   scene.add_column(1.5, 0.5, 0.1, 0.5, 3.5);
   EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
+}
+
+// In view, but too far away for the test of what stands around: 4.5 m behind, seen from -y.
+void add_tree_behind(Scene& scene) {
+  scene.add_column(0.3, 4.5, 0.1, 0.5, 3.5);
+}
+
+TEST(NotATree, APostEndsSuddenlyBeforeWhatWasSeenBehindIt) {
+  Scene scene;
+  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
+  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
+  add_tree_behind(scene);
+  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kEndsLow);
+}
+
+TEST(NotATree, BranchesThatHangOverAPostMakeItNoTree) {
+  Scene scene;
+  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
+  add_tree_behind(scene);
+  scene.add_thicket(0.3, 2.5, 3.5, 500);
+  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kEndsLow);
+}
+
+TEST(NotATree, AStemWhoseUpperPartIsHiddenIsATree) {
+  // What hides it hides what stands behind it as well; at its sides others are seen.
+  Scene scene;
+  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
+  scene.add_column(4.0, 0.0, 0.1, 0.5, 3.5);
+  scene.add_column(-4.0, 1.0, 0.1, 0.5, 3.5);
+  scene.add_column(0.0, -4.0, 0.1, 0.5, 3.5);
+  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
+}
+
+TEST(NotATree, AStemThatThinsOutUpwardsMayGoOn) {
+  // Ever fewer beams look up to it.
+  Scene scene;
+  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.0);
+  scene.add_column(0.0, 0.0, 0.07, 1.58, 1.6);
+  add_tree_behind(scene);
+  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
+}
+
+TEST(NotATree, AnEndRightBelowFoliageMayBeHiddenByIt) {
+  Scene scene;
+  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
+  add_tree_behind(scene);
+  scene.add_column(0.0, 0.0, 0.2, 1.7, 2.3);  // it hides what stands within
+  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
+}
+
+TEST(NotATree, AStemThatGoesOnShiftedIsATree) {
+  Scene scene;
+  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
+  add_tree_behind(scene);
+  scene.add_column(0.2, 0.0, 0.06, 1.6, 3.5);
+  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
+}
+
+TEST(NotATree, APostWithinFoliageEndsWhereTheFoliageGoesOn) {
+  Scene scene;
+  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
+  add_tree_behind(scene);
+  scene.add_column(0.0, 0.0, 0.2, 0.5, 3.5);
+  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kEndsLow);
+}
+
+TEST(NotATree, AYoungTreeWithinFoliageMayEndLow) {
+  Scene scene;
+  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
+  add_tree_behind(scene);
+  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6, true), TreeDoubt::kNone);
 }
 
 TEST(NotATree, ACornerOfWallsIsPartOfPlanes) {
