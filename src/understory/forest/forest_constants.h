@@ -178,7 +178,7 @@ inline constexpr std::size_t kLeastBends = 50;
 // Median of the absolute value of a standard normal variable [bound: definition]
 inline constexpr double kMedianOfNormal = 0.6745;
 // Standard deviation 2 m from the nearest seen ground, over the roughness [tuned on random seeds 1,
-// 3, 4, 9, 13, 16: docs/method/forest.md, Unseen ground]
+// 3, 4, 9, 13, 16: docs/method/forest-experiments.md, Unseen ground]
 inline constexpr double kSdPerRoughness = 3.0;
 // m: terrain is not filled in farther [bound: above the default of ground.max_gap_m]
 inline constexpr double kFarthest = 12.0;
