@@ -200,8 +200,12 @@ std::vector<StemLoop> find_stem_loops(const StemPath& path, const StemLoopConfig
   UNDERSTORY_CHECK(path.views.size() == path.world_from_view.size());
   UNDERSTORY_CHECK(path.views.size() == path.step_covariances.size());
   const double l0_m = median_l0(path.views);
-  const Gathering gathering{config.gather_l0 * l0_m, config.gather_views, kMergeL0 * l0_m,
-                            estimate_view_cone(path.views).range_m, kSeenShare};
+  const Gathering gathering{config.gather_l0 * l0_m,
+                            config.gather_views,
+                            kMergeL0 * l0_m,
+                            estimate_view_cone(path.views).range_m,
+                            kSeenShare,
+                            true};
   const std::vector<SparsePoints> gathered =
       gathered_views(path.views, path.world_from_view, gathering);
   const Finder finder(path, gathered, gathering.reach_m, config);

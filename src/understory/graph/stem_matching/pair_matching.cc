@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "understory/geometry/matrix_inverse.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/graph/graph_constants.h"
 #include "understory/registration/stems/tilt_about.h"
 #include "understory/util/index.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -120,6 +123,60 @@ PairMatch match_lattice_pair(const SparseTarget& target, const SparsePoints& sou
   return match;
 }
 
+namespace {
+
+// One stem of views laid together.
+struct GatheredStem {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int sights = 0;
+  std::uint64_t views = 0;  // which ones see it: bits, 64 views on from the first again
+
+  [[nodiscard]] Eigen::Vector3d mean() const { return sum / sights; }
+  void add(const GatheredStem& other) {
+    sum += other.sum;
+    sights += other.sights;
+    views |= other.views;
+  }
+};
+
+SparsePoints means_of(const std::vector<GatheredStem>& stems) {
+  SparsePoints means;
+  for (const GatheredStem& stem : stems)
+    means.push_back(stem.mean());
+  return means;
+}
+
+// Of two stems that no view sees both, the one with fewer sights joins the other.
+void join_split(std::vector<GatheredStem>& stems, double merge_m) {
+  sort_stably(stems,
+              [](const GatheredStem& a, const GatheredStem& b) { return a.sights > b.sights; });
+  const SparsePoints means = means_of(stems);
+  const PlaneGrid grid(means);
+  std::vector<GatheredStem> joined;
+  std::vector<int> index(stems.size(), -1);
+  for (std::size_t t = 0; t < stems.size(); ++t) {
+    int nearest = -1;
+    double least_m2 = merge_m * merge_m;
+    grid.around(means[t], merge_m, [&](int other) {
+      if (index[at(other)] < 0) return;
+      const double m2 = (means[at(other)] - means[t]).head<2>().squaredNorm();
+      if (m2 < least_m2 && (joined[at(index[at(other)])].views & stems[t].views) == 0) {
+        least_m2 = m2;
+        nearest = index[at(other)];
+      }
+    });
+    if (nearest >= 0) {
+      joined[at(nearest)].add(stems[t]);
+    } else {
+      index[t] = static_cast<int>(joined.size());
+      joined.push_back(stems[t]);
+    }
+  }
+  stems = std::move(joined);
+}
+
+}  // namespace
+
 SparsePoints gather_views(const std::vector<SparsePoints>& views,
                           const std::vector<Pose>& world_from_view, int centre,
                           const Gathering& gathering) {
@@ -139,15 +196,13 @@ SparsePoints gather_views(const std::vector<SparsePoints>& views,
   const int last = last_within(1);
   const int stride = std::max(1, (last - first) / (2 * gathering.max_views));
   const Pose centre_from_world = world_from_view[at(centre)].inverse();
-  SparsePoints sums;
-  std::vector<int> sights;
+  std::vector<GatheredStem> stems;
   SparsePoints places;  // of the views
   const int begin = centre - (centre - first) / stride * stride;
   for (int k = begin; k <= last; k += stride) {
     const Pose centre_from_view = centre_from_world * world_from_view[at(k)];
-    SparsePoints means;
-    for (std::size_t t = 0; t < sums.size(); ++t)
-      means.push_back(sums[t] / sights[t]);
+    const std::uint64_t view = std::uint64_t{1} << places.size() % 64;
+    const SparsePoints means = means_of(stems);
     const PlaneGrid grid(means);
     std::vector<char> taken(means.size(), 0);
     for (const Eigen::Vector3d& point : views[at(k)]) {
@@ -156,25 +211,24 @@ SparsePoints gather_views(const std::vector<SparsePoints>& views,
       const auto found =
           means.empty() ? PlaneGrid::Neighbour{} : grid.nearest(here, gathering.merge_m, 0.0);
       if (found.index < 0) {
-        sums.push_back(here);
-        sights.push_back(1);
+        stems.push_back({here, 1, view});
       } else if (taken[at(found.index)] == 0) {
         taken[at(found.index)] = 1;
-        sums[at(found.index)] += here;
-        ++sights[at(found.index)];
+        stems[at(found.index)].add({here, 1, view});
       }
     }
     places.push_back(centre_from_view.translation());
   }
+  if (gathering.join_split) join_split(stems, gathering.merge_m);
   SparsePoints result;
-  for (std::size_t t = 0; t < sums.size(); ++t) {
-    const Eigen::Vector3d mean = sums[t] / sights[t];
+  for (const GatheredStem& stem : stems) {
+    const Eigen::Vector3d mean = stem.mean();
     const auto near =
         std::count_if(places.begin(), places.end(), [&](const Eigen::Vector3d& place) {
           return (mean - place).head<2>().norm() <= gathering.radius_m;
         });
-    if (places.size() >= 3 && sights[t] < 2) continue;
-    if (sights[t] < gathering.least_share * static_cast<double>(near)) continue;
+    if (places.size() >= 3 && stem.sights < 2) continue;
+    if (stem.sights < gathering.least_share * static_cast<double>(near)) continue;
     result.push_back(mean);
   }
   return result;

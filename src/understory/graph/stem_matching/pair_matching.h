@@ -45,6 +45,9 @@ struct Gathering {
   double radius_m = 0.0;  // in the plane, of the stems that are kept; 0: all
   // Of the views within `radius_m` of a stem, so many see it, 0..1: what fewer see is no stem.
   double least_share = 0.0;
+  // Noisy sights of one stem may lie so far apart that they begin two. Those within `merge_m` that
+  // no view sees both are one then.
+  bool join_split = false;
 };
 
 // Views around one, laid together in its frame by their poses. Stems seen in several views are
