@@ -325,7 +325,7 @@ def bench_real():
         ("odometry, segments of 100 / 200 / 300 / 400 m, in plane",
          " / ".join(f"{s['translation_plane_percent']:.2f}" for s in segments) + " %"),
         ("the same in space", " / ".join(f"{s['translation_percent']:.1f}" for s in segments) + " %"),
-        ("APE in plane, aligned by SE(3): chained odometry / answer",
+        ("APE in plane, aligned by SE(3): chained odometry / result",
          f"{before['ape_plane_rmse_m']:.2f} / {after['ape_plane_rmse_m']:.2f} m"),
         ("the same in space", f"{before['ape_rmse_m']:.1f} / {after['ape_rmse_m']:.1f} m"),
         (f"loops: recall@1 ({loops['queries']} queries) / at 100 % precision",
@@ -371,7 +371,7 @@ def bench_spoilt():
     with concurrent.futures.ThreadPoolExecutor(2) as workers:
         found = dict(zip(jobs, workers.map(measured, jobs)))
     text = (f"{version()}, {machine()}\n\n| Wild-Places V-03 | recall@1: single views / laid together "
-            "| loops accepted, right | APE in plane: odometry / answer, m (single views) | s |\n"
+            "| loops accepted, right | APE in plane: odometry / result, m (single views) | s |\n"
             "|---|---|---|---|---|\n")
     for way in WAYS:
         single, gathered = found[way, False], found[way, True]

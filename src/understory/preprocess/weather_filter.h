@@ -29,11 +29,11 @@ void describe(ConfigTable& table, WeatherFilterConfig& config);
 
 // Takes returns out of a scan that are dark and stand alone, in their scan and in those before it.
 // A wall, a stem or the ground is in the scan before too; a flake is not.
-//   s  distance to the others of the same scan, over 0.1 m + range, at most `reach`:
-//      cbrt(d1^2 d2) of the nearest and the second nearest
-//   b  the same to those of the scans before
-//   i  intensity over that of the bright returns: nine of ten are darker
-//   w  weight by the share of the returns around that stand alone (LoneShare), at most 1
+//   s  cbrt(d1^2 d2) in the same scan. The nearest return is d1 away and the second nearest d2, as
+//      shares of 0.1 m + range and at most `reach`.
+//   b  the same in the scans before.
+//   i  intensity over that of the bright returns: nine of ten are darker.
+//   w  weight by the share of the returns around that stand alone (LoneShare), at most 1.
 // A return goes where sqrt(s b) w (range / 10 m)^0.16 > apart (i + 0.02). It must be 1.2 times as
 // far where a neighbour on its ring goes on with it. Bright returns thus never go. What goes along
 // with the lidar is looked up where it is, seen from there. Without intensities (all the same)

@@ -80,23 +80,24 @@ TEST(NotATree, AStemThatIsHiddenFurtherUpIsATree) {
   EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
 }
 
-// In view, but too far away for the test of what stands around: 4.5 m behind, seen from -y.
-void add_tree_behind(Scene& scene) {
+// A post that ends at 1.6 m, seen from -y. The tree 4.5 m behind it is in view, but too far away
+// for the test of what stands around.
+Scene post_before_a_tree() {
+  Scene scene;
+  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
   scene.add_column(0.3, 4.5, 0.1, 0.5, 3.5);
+  return scene;
 }
 
 TEST(NotATree, APostEndsSuddenlyBeforeWhatWasSeenBehindIt) {
-  Scene scene;
-  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
-  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
-  add_tree_behind(scene);
-  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kEndsLow);
+  Scene alone;
+  alone.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
+  EXPECT_EQ(alone.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
+  EXPECT_EQ(post_before_a_tree().doubt(0.07, 0.5, 1.6), TreeDoubt::kEndsLow);
 }
 
 TEST(NotATree, BranchesThatHangOverAPostMakeItNoTree) {
-  Scene scene;
-  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
-  add_tree_behind(scene);
+  Scene scene = post_before_a_tree();
   scene.add_thicket(0.3, 2.5, 3.5, 500);
   EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kEndsLow);
 }
@@ -116,39 +117,36 @@ TEST(NotATree, AStemThatThinsOutUpwardsMayGoOn) {
   Scene scene;
   scene.add_column(0.0, 0.0, 0.07, 0.5, 1.0);
   scene.add_column(0.0, 0.0, 0.07, 1.58, 1.6);
-  add_tree_behind(scene);
+  scene.add_column(0.3, 4.5, 0.1, 0.5, 3.5);
   EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
 }
 
 TEST(NotATree, AnEndRightBelowFoliageMayBeHiddenByIt) {
-  Scene scene;
-  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
-  add_tree_behind(scene);
+  Scene scene = post_before_a_tree();
   scene.add_column(0.0, 0.0, 0.2, 1.7, 2.3);  // it hides what stands within
   EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
 }
 
+TEST(NotATree, AStemThatGoesOnBehindAGapIsATree) {
+  Scene scene = post_before_a_tree();
+  scene.add_column(0.0, 0.0, 0.07, 1.8, 3.5);
+  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
+}
+
 TEST(NotATree, AStemThatGoesOnShiftedIsATree) {
-  Scene scene;
-  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
-  add_tree_behind(scene);
+  Scene scene = post_before_a_tree();
   scene.add_column(0.2, 0.0, 0.06, 1.6, 3.5);
   EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kNone);
 }
 
 TEST(NotATree, APostWithinFoliageEndsWhereTheFoliageGoesOn) {
-  Scene scene;
-  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
-  add_tree_behind(scene);
+  Scene scene = post_before_a_tree();
   scene.add_column(0.0, 0.0, 0.2, 0.5, 3.5);
   EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6), TreeDoubt::kEndsLow);
 }
 
 TEST(NotATree, AYoungTreeWithinFoliageMayEndLow) {
-  Scene scene;
-  scene.add_column(0.0, 0.0, 0.07, 0.5, 1.6);
-  add_tree_behind(scene);
-  EXPECT_EQ(scene.doubt(0.07, 0.5, 1.6, true), TreeDoubt::kNone);
+  EXPECT_EQ(post_before_a_tree().doubt(0.07, 0.5, 1.6, true), TreeDoubt::kNone);
 }
 
 TEST(NotATree, ACornerOfWallsIsPartOfPlanes) {

@@ -366,24 +366,5 @@ TEST(PairMatching, GatheredViewsSeeMoreAndSharper) {
   EXPECT_LT(std::sqrt(squares / static_cast<double>(counted)), 0.03);
 }
 
-// The first two sights lie farther apart than the limit, and the others between them.
-TEST(PairMatching, GatheredSightsThatBeginTwoStemsAreOne) {
-  std::vector<SparsePoints> views;
-  for (const double x : {-0.25, 0.25, -0.15, 0.15, -0.1, 0.1})
-    views.push_back({{5.0 + x, 0.0, 0.0}});
-  const std::vector<Pose> still(views.size());
-  const Gathering joined{1.0, 10, 0.4, 0.0, 0.0, true};
-  const SparsePoints stems = gather_views(views, still, 0, joined);
-  ASSERT_EQ(stems.size(), 1U);
-  EXPECT_NEAR(stems[0].x(), 5.0, 1e-9);
-}
-
-TEST(PairMatching, GatheredStemsThatOneViewSeesStayTwo) {
-  const std::vector<SparsePoints> views(6, {{5.0, 0.0, 0.0}, {5.3, 0.0, 0.0}});
-  const std::vector<Pose> still(views.size());
-  const Gathering joined{1.0, 10, 0.4, 0.0, 0.0, true};
-  EXPECT_EQ(gather_views(views, still, 0, joined).size(), 2U);
-}
-
 }  // namespace
 }  // namespace understory
