@@ -50,8 +50,8 @@ def main():
     parser.add_argument("--seed", type=int, default=3)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--point-seconds", type=float, default=8.0, help="of the counts of points")
-    parser.add_argument("--apart", type=float, default=0.119)
-    parser.add_argument("--scans", type=int, default=2)
+    parser.add_argument("--apart", type=float, default=0.111)
+    parser.add_argument("--scans", type=int, default=3)
     parser.add_argument("--only-points", action="store_true")
     options = parser.parse_args()
     print(f"version {version()}, {machine()}, seed {options.seed}\n\n"

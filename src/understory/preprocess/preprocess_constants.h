@@ -79,22 +79,29 @@ inline constexpr float kDarkest = 0.02F;
 inline constexpr float kUsualRangeM = 10.0F;
 // Power of the range over that one by which less is needed farther away. False ranges come from
 // anywhere, what is there is mostly near [tuned: skidoo, lake, tuusniemi1, harvester, seeds 3, 5,
-// 7]
-inline constexpr float kByRange = 0.16F;
+// 7, 9, 151, 152]
+inline constexpr float kByRange = 0.18F;
 // Share of the range within which a return that stands alone has nothing near, over the reach
 // [chosen]
 inline constexpr float kAlone = 0.8F;
 // Share of the returns around one that stand alone, from which on there is weather [tuned: as
 // above]
-inline constexpr double kLoneInWeather = 0.037;
+inline constexpr double kLoneInWeather = 0.039;
 // Added to that share: some stand alone in clear weather too [tuned: as above]
-inline constexpr double kLoneAnywhere = 0.0057;
+inline constexpr double kLoneAnywhere = 0.008;
 // Power of that share by which a return must be farther from others where there is less weather
 // [tuned: as above]
-inline constexpr double kByLoneShare = 0.54;
+inline constexpr double kByLoneShare = 0.63;
+// Share of the returns around one that stand alone, from which on the weather is thick. Good
+// returns between flakes have few others near them, and flakes stand out there [tuned: as above]
+inline constexpr double kThickFrom = 0.05;
+// The share at which it is as thick as can be [tuned: as above]
+inline constexpr double kThickest = 0.29;
+// How many times as far from others a return must be in the thickest weather [tuned: as above]
+inline constexpr double kInThickest = 2.05;
 // How many times as far from others it must be where a neighbour on the ring goes on with it
 // [tuned: as above]
-inline constexpr float kContinues = 1.2F;
+inline constexpr float kContinues = 1.32F;
 // Rings on either side that are around a return [tuned: as above]
 inline constexpr int kRingsAround = 2;
 // Columns of a scan before and after it that are around a return, of 180 [tuned: as above]

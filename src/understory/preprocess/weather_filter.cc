@@ -45,8 +45,11 @@ std::vector<std::uint8_t> continuing(const BodyCloud& cloud, float within) {
 }
 
 // Weight of what speaks for weather, 0..1, by the share of those around that stand alone.
-double expected(double share) {
-  return std::pow(std::min((share + kLoneAnywhere) / kLoneInWeather, 1.0), kByLoneShare);
+double weight_of(double share) {
+  const double expected =
+      std::pow(std::min((share + kLoneAnywhere) / kLoneInWeather, 1.0), kByLoneShare);
+  const double thick = std::clamp((share - kThickFrom) / (kThickest - kThickFrom), 0.0, 1.0);
+  return expected / (1.0 + (kInThickest - 1.0) * thick);
 }
 
 void keep_only(const std::vector<std::uint8_t>& keep, BodyCloud& cloud) {
@@ -122,7 +125,7 @@ std::vector<std::uint8_t> WeatherFilter::judge(const BodyCloud& cloud,
   const Lone lone = find_lone(cloud, bright, past_from_body);
   const LoneShare share(cloud.ring, cloud.t_ns, cloud.range, lone.alone);
   parallel_for(cloud.size(), kGrain, [&](std::size_t i) {
-    if (lone.excess[i] > 0.0F && lone.excess[i] * expected(share.around(i)) > 1.0) keep[i] = 0;
+    if (lone.excess[i] > 0.0F && lone.excess[i] * weight_of(share.around(i)) > 1.0) keep[i] = 0;
   });
   return keep;
 }

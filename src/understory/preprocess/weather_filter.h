@@ -21,9 +21,9 @@ struct WeatherFilterConfig {
   bool enabled = false;
   // Where there is weather, a return is one where its distance from others, as a share of its
   // range, is above this times its brightness.
-  double apart = 0.119;
+  double apart = 0.111;
   double reach = 0.05;  // share of its range beyond which a return is alone
-  int scans = 2;        // before this one, in which what stands still must have been seen
+  int scans = 3;        // before this one, in which what stands still must have been seen
 };
 void describe(ConfigTable& table, WeatherFilterConfig& config);
 
@@ -33,8 +33,9 @@ void describe(ConfigTable& table, WeatherFilterConfig& config);
 //      shares of 0.1 m + range and at most `reach`.
 //   b  the same in the scans before.
 //   i  intensity over that of the bright returns: nine of ten are darker.
-//   w  weight by the share of the returns around that stand alone (LoneShare), at most 1.
-// A return goes where sqrt(s b) w (range / 10 m)^0.16 > apart (i + 0.02). It must be 1.2 times as
+//   w  weight by the share of the returns around that stand alone (LoneShare), at most 1. It falls
+//      again where the weather is so thick that good returns stand alone, too.
+// A return goes where sqrt(s b) w (range / 10 m)^0.18 > apart (i + 0.02). It must be 1.32 times as
 // far where a neighbour on its ring goes on with it. Bright returns thus never go. What goes along
 // with the lidar is looked up where it is, seen from there. Without intensities (all the same)
 // nothing goes. One scan after another; not thread-safe, parallel inside, the same result for any

@@ -163,7 +163,7 @@ bool continues(const BodyCloud& cloud, std::size_t i) {
   return (i >= 16 && near(i - 16)) || (i + 16 < cloud.size() && near(i + 16));
 }
 
-// sqrt(s b) (range / 10 m)^0.16 over 0.119 (i + 0.02), and 1 where nothing is near.
+// sqrt(s b) (range / 10 m)^0.18 over 0.111 (i + 0.02), and 1 where nothing is near.
 std::pair<std::vector<double>, std::vector<std::uint8_t>> excess_of(const BodyCloud& now,
                                                                     const BodyCloud& before) {
   std::vector<float> sorted = now.intensity;
@@ -174,12 +174,18 @@ std::pair<std::vector<double>, std::vector<std::uint8_t>> excess_of(const BodyCl
   for (std::size_t i = 0; i < now.size(); ++i) {
     const auto s = shares(now, now.points[i], now.range[i], i);
     const auto b = shares(before, now.points[i], now.range[i], before.size());
-    excess.push_back(std::sqrt(apart(s) * apart(b)) * std::pow((0.1 + now.range[i]) / 10.0, 0.16) /
-                     (0.119 * (now.intensity[i] / bright + 0.02)) /
-                     (continues(now, i) ? 1.2 : 1.0));
+    excess.push_back(std::sqrt(apart(s) * apart(b)) * std::pow((0.1 + now.range[i]) / 10.0, 0.18) /
+                     (0.111 * (now.intensity[i] / bright + 0.02)) /
+                     (continues(now, i) ? 1.32 : 1.0));
     alone.push_back(excess.back() > 1.0 && std::min(s[0], b[0]) > 0.04 ? 1 : 0);
   }
   return {excess, alone};
+}
+
+// ((f + 0.008) / 0.039)^0.63 up to 1, and down to 1 / 2.05 from a share f of 0.05 to one of 0.29.
+double weight_of(double f) {
+  const double expected = std::pow(std::min((f + 0.008) / 0.039, 1.0), 0.63);
+  return expected / (1.0 + 1.05 * std::clamp((f - 0.05) / 0.24, 0.0, 1.0));
 }
 
 TEST(WeatherFilter, IsTheRuleOverAllPoints) {
@@ -189,8 +195,7 @@ TEST(WeatherFilter, IsTheRuleOverAllPoints) {
   const LoneShare share(now.ring, now.t_ns, now.range, alone);
   std::vector<std::uint32_t> expected;
   for (std::size_t i = 0; i < now.size(); ++i) {
-    const double around = std::min((share.around(i) + 0.0057) / 0.037, 1.0);
-    if (excess[i] <= 1.0 || excess[i] * std::pow(around, 0.54) <= 1.0)
+    if (excess[i] <= 1.0 || excess[i] * weight_of(share.around(i)) <= 1.0)
       expected.push_back(now.t_ns[i]);
   }
   for (const int threads : {1, 4}) {

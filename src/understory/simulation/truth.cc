@@ -13,6 +13,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <system_error>
 
 #include "understory/sensor/tree.h"
 #include "understory/simulation/scene/true_crowns.h"
@@ -256,15 +257,41 @@ void write_terrain(const std::string& path, const Terrain& terrain) {
 void TruthLog::add(const ScanTruth& scan, const std::vector<StemReturns>& stems) {
   scans_.push_back(scan);
   for (const StemReturns& stem : stems) {
-    if (blocks_.empty() || blocks_.back().size() == kBlock) {
+    if (blocks_.empty() || blocks_.back().stems.size() == kBlock) {
+      if (!blocks_.empty()) put_away(blocks_.back());
       blocks_.emplace_back();
-      blocks_.back().reserve(kBlock);
+      blocks_.back().stems.reserve(kBlock);
     }
-    blocks_.back().push_back({stem.tree, static_cast<std::uint16_t>(stem.rings),
-                              static_cast<std::uint16_t>(stem.rings_with_3),
-                              static_cast<std::uint32_t>(stem.returns)});
+    blocks_.back().stems.push_back({stem.tree, static_cast<std::uint16_t>(stem.rings),
+                                    static_cast<std::uint16_t>(stem.rings_with_3),
+                                    static_cast<std::uint32_t>(stem.returns)});
   }
   stems_end_.push_back((stems_end_.empty() ? 0 : stems_end_.back()) + stems.size());
+}
+
+void TruthLog::put_away(Block& block) {
+  try {
+    if (!scratch_) {
+      std::error_code none;
+      const std::filesystem::path folder = std::filesystem::temp_directory_path(none);
+      if (none) return;  // they stay in memory
+      scratch_.emplace(folder);
+    }
+    block.part = scratch_->append(block.stems.data(), block.stems.size() * sizeof(Packed));
+  } catch (const OutputError&) {
+    return;
+  }
+  block.stems = {};
+}
+
+const std::vector<TruthLog::Packed>& TruthLog::read(std::size_t block) const {
+  if (!blocks_[block].stems.empty()) return blocks_[block].stems;
+  if (read_ != block || read_stems_.empty()) {
+    read_stems_.resize(blocks_[block].part.size / sizeof(Packed));
+    scratch_->read(blocks_[block].part, read_stems_.data());
+    read_ = block;
+  }
+  return read_stems_;
 }
 
 std::vector<ScanTruth> TruthLog::poses() const {
@@ -279,7 +306,7 @@ std::vector<ScanTruth> TruthLog::poses() const {
 std::vector<StemReturns> TruthLog::stems(std::size_t i) const {
   std::vector<StemReturns> result;
   for (std::size_t k = i == 0 ? 0 : stems_end_[i - 1]; k < stems_end_[i]; ++k) {
-    const Packed& stem = blocks_[k / kBlock][k % kBlock];
+    const Packed& stem = read(k / kBlock)[k % kBlock];
     result.push_back({stem.tree, stem.rings, stem.rings_with_3, static_cast<int>(stem.returns)});
   }
   return result;

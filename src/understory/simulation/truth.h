@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "understory/simulation/sensors/scanner.h"
 #include "understory/simulation/sensors/total_station.h"
 #include "understory/simulation/world.h"
+#include "understory/util/files/scratch_file.h"
 #include "understory/util/time.h"
 
 namespace understory {
@@ -23,7 +25,9 @@ struct ScanTruth {
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
 };
 
-// What a recording's truth has come to, scan by scan.
+// What a recording's truth has come to, scan by scan. The returns of stems go to a temporary file
+// in blocks, so a long run takes no memory for them. Where no such file can be made or written they
+// stay in memory. Not thread-safe.
 class TruthLog {
  public:
   void add(const ScanTruth& scan, const std::vector<StemReturns>& stems);
@@ -42,14 +46,22 @@ class TruthLog {
     std::uint16_t rings_with_3;
     std::uint32_t returns;
   };
+  struct Block {
+    std::vector<Packed> stems;  // empty once they are in the file
+    ScratchFile::Part part;
+  };
   static constexpr std::size_t kBlock = 1 << 16;
+  void put_away(Block& block);
+  [[nodiscard]] const std::vector<Packed>& read(std::size_t block) const;
 
   std::vector<ScanTruth> scans_;
   std::vector<ScanTruth> further_;  // of the second lidar
-  // Of all scans, one after another, in blocks. A small vector a scan, kept among large ones that
-  // come and go, made the heap of a long run grow by 60 kB a scan. A single vector takes up to
-  // three times its size while it grows: a strip road by stems had 28 MB more at its peak.
-  std::vector<std::vector<Packed>> blocks_;
+  // Of all scans, one after another. A small vector a scan, kept among large ones that come and go,
+  // made the heap of a long run grow by 60 kB a scan.
+  std::vector<Block> blocks_;
+  std::optional<ScratchFile> scratch_;  // from the first full block on
+  mutable std::size_t read_ = 0;        // block that was read last, if any was
+  mutable std::vector<Packed> read_stems_;
   std::vector<std::size_t> stems_end_;  // of each scan
 };
 

@@ -2,17 +2,22 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <string>
+#include <vector>
+
 namespace understory {
 namespace {
 
-// More stems than one block of the log holds, and a scan without any.
-TEST(TruthLog, GivesBackEachScansStems) {
-  constexpr int kScans = 1000;
-  constexpr int kStems = 150;
-  const auto stem_of = [](int scan, int k) {
-    return StemReturns{100'000 * k + scan, (scan + k) % 129, k % 100, 300 * scan + k};
-  };
-  TruthLog log;
+constexpr int kScans = 1000;
+constexpr int kStems = 150;
+
+StemReturns stem_of(int scan, int k) {
+  return {100'000 * k + scan, (scan + k) % 129, k % 100, 300 * scan + k};
+}
+
+// Of more stems than two blocks hold; scan 7 has none.
+void fill(TruthLog& log) {
   for (int scan = 0; scan < kScans; ++scan) {
     std::vector<StemReturns> stems;
     for (int k = 0; k < (scan == 7 ? 0 : kStems); ++k)
@@ -21,21 +26,43 @@ TEST(TruthLog, GivesBackEachScansStems) {
     truth.stamp = scan;
     log.add(truth, stems);
   }
-  ASSERT_EQ(log.scans().size(), static_cast<std::size_t>(kScans));
-  EXPECT_TRUE(log.stems(7).empty());
-  for (int scan = 0; scan < kScans; ++scan) {
-    if (scan == 7) continue;
-    const std::vector<StemReturns> stems = log.stems(static_cast<std::size_t>(scan));
-    ASSERT_EQ(stems.size(), static_cast<std::size_t>(kStems)) << scan;
-    for (int k = 0; k < kStems; ++k) {
-      const StemReturns& stem = stems[static_cast<std::size_t>(k)];
-      const StemReturns wanted = stem_of(scan, k);
-      ASSERT_EQ(stem.tree, wanted.tree) << scan;
-      ASSERT_EQ(stem.rings, wanted.rings) << scan;
-      ASSERT_EQ(stem.rings_with_3, wanted.rings_with_3) << scan;
-      ASSERT_EQ(stem.returns, wanted.returns) << scan;
-    }
+}
+
+void expect_stems_of(const TruthLog& log, int scan) {
+  const std::vector<StemReturns> stems = log.stems(static_cast<std::size_t>(scan));
+  ASSERT_EQ(stems.size(), static_cast<std::size_t>(scan == 7 ? 0 : kStems)) << scan;
+  for (std::size_t k = 0; k < stems.size(); ++k) {
+    const StemReturns wanted = stem_of(scan, static_cast<int>(k));
+    ASSERT_EQ(stems[k].tree, wanted.tree) << scan;
+    ASSERT_EQ(stems[k].rings, wanted.rings) << scan;
+    ASSERT_EQ(stems[k].rings_with_3, wanted.rings_with_3) << scan;
+    ASSERT_EQ(stems[k].returns, wanted.returns) << scan;
   }
+}
+
+TEST(TruthLog, GivesBackEachScansStems) {
+  TruthLog log;
+  fill(log);
+  ASSERT_EQ(log.scans().size(), static_cast<std::size_t>(kScans));
+  for (int scan = 0; scan < kScans; ++scan)
+    expect_stems_of(log, scan);
+  for (const int scan : {990, 3, 700, 7, 440})
+    expect_stems_of(log, scan);
+}
+
+TEST(TruthLog, KeepsThemInMemoryWhereThereIsNoFolderForThem) {
+  const char* const before = std::getenv("TMPDIR");
+  const std::string kept = before == nullptr ? "" : before;
+  setenv("TMPDIR", "/nowhere/at/all", 1);
+  TruthLog log;
+  fill(log);
+  if (before == nullptr) {
+    unsetenv("TMPDIR");
+  } else {
+    setenv("TMPDIR", kept.c_str(), 1);
+  }
+  for (const int scan : {0, 7, 999, 500})
+    expect_stems_of(log, scan);
 }
 
 TEST(TruthLog, PosesOfBothLidarsComeInOrderOfTime) {
