@@ -12,6 +12,7 @@
 #include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/not_a_tree.h"
 #include "understory/forest/stems/point_index.h"
+#include "understory/forest/stems/stem_criteria.h"
 #include "understory/forest/stems/stem_fit.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
@@ -22,18 +23,8 @@ namespace {
 
 using namespace stem_constants::stem_detector;
 
-// One way of cutting the points: thin slices for dense clouds, thick ones for what is left of
-// sparse clouds.
-struct Cut {
-  double thickness_m = 0.25;
-  int min_slices = 3;
-  double reach_m = kThinReach;
-  double band_m = kThinBand;
-  bool only_clear = false;  // columns that stand clear or alone, and nothing else
-};
-
 std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
-                             const std::vector<char>& explained, const Cut& cut,
+                             const std::vector<char>& explained, const SliceCut& cut,
                              const StemDetectorConfig& config, const StemSearchArea& where,
                              const ProgressSink& progress) {
   const double span = config.highest_m - config.lowest_m;
@@ -66,122 +57,6 @@ std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
   return rings;
 }
 
-// How much may lie beside the surface, as the sum of both ratios of StemEvidence, for it still to
-// be a stem. In a thicket it takes many slices that agree to accept one; a steep lean is what a
-// line through scattered points has.
-double max_clutter(const StemFitResult& fit, double lean_deg) {
-  const auto rings = static_cast<double>(fit.stem.slices.size());
-  if (lean_deg > kSteepLeanDeg) return kSteepClutter;
-  const double limit =
-      std::min(kMostClutter, kClutterOfTwo + kClutterPerRing * std::max(0.0, rings - 2.0));
-  const bool noisy = fit.evidence.scatter_m > kNoisyScatter && rings < kFewRings;
-  return noisy ? std::min(limit, kNoisyClutter) : limit;
-}
-
-// From the lowest slice that shows a stem to the highest one.
-double slices_between(const StemFit& stem, const StemDetectorConfig& config) {
-  return std::floor(stem.highest_m / config.slice_m) - std::floor(stem.lowest_m / config.slice_m) +
-         1.0;
-}
-
-double lean_deg_of(const StemFit& stem) {
-  return std::atan(stem.slope.norm()) * 180.0 / M_PI;
-}
-
-// A slim column of points that stands alone: with a thin stem and noisy ranges its inside fills up,
-// but nothing else looks like that.
-bool stands_alone(const StemFitResult& fit, const StemDetectorConfig& config) {
-  const StemEvidence& e = fit.evidence;
-  return fit.stem.radius_m <= kSlimRadius && e.outside_ratio <= kAloneOutside &&
-         lean_deg_of(fit.stem) <= kAloneLeanDeg &&
-         fit.stem.highest_m - fit.stem.lowest_m >= kAloneExtent &&
-         e.slices >= kAloneSlices * slices_between(fit.stem, config) &&
-         e.even_arc_deg >= kAloneArcDeg &&
-         e.scatter_m <= kAloneScatterShare * fit.stem.radius_m + kAloneScatter;
-}
-
-// Through the highest slice.
-bool reaches_top(const StemFit& stem, const StemDetectorConfig& config) {
-  return stem.highest_m > config.highest_m - config.slice_m;
-}
-
-// A column with hardly a point beside or inside it, from bottom to top: a stem that was seen from
-// one side, from afar. Its diameter may be uncertain, and what stands before it may hide its foot.
-// `radius_sd_m`: of the radius at breast height.
-bool is_clear_column(const StemFitResult& fit, const StemDetectorConfig& config,
-                     double radius_sd_m) {
-  const StemFit& stem = fit.stem;
-  const StemEvidence& e = fit.evidence;
-  return e.inside_ratio + e.outside_ratio <= kClearClutter && lean_deg_of(stem) <= kAloneLeanDeg &&
-         stem.highest_m - stem.lowest_m >= kClearExtent && reaches_top(stem, config) &&
-         stem.lowest_m <= kBreastHeight + kClearBeginsAbove &&
-         e.slices >= kAloneSlices * slices_between(stem, config) &&
-         e.even_arc_deg >= kClearArcDeg && e.scatter_m <= kClearScatterShare * stem.radius_m &&
-         radius_sd_m <= kClearSd * stem.radius_m;
-}
-
-// Is it a stem, or a bush that a cone happens to fit?
-bool is_stem(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig& config) {
-  if (!fit.converged) return false;
-  const StemFit& stem = fit.stem;
-  const StemEvidence& e = fit.evidence;
-  const double dbh = 2.0 * stem.radius_m;
-  const double dbh_sd = 2.0 * std::sqrt(std::max(0.0, stem.covariance(2, 2)));
-  const double lean_deg = lean_deg_of(stem);
-  const double extent = stem.highest_m - stem.lowest_m;
-  // Steep leans are rare, and a line through scattered points leans as it likes: they have to be
-  // better supported.
-  const double wanted_returns = config.min_returns * (1.0 + std::pow(lean_deg / kSteepLeanDeg, 2));
-  if (dbh < config.min_dbh_m || dbh > config.max_dbh_m || lean_deg > config.max_lean_deg ||
-      e.returns < wanted_returns || e.slices < config.min_slices ||
-      e.slices < kLeastSliceShare * slices_between(stem, config) ||
-      extent < std::max(kLeastExtent, 2.0 * cut.thickness_m) || stem.arc_deg < config.min_arc_deg ||
-      e.even_arc_deg < kEvenArcOfLeast * config.min_arc_deg) {
-    return false;
-  }
-  if (is_clear_column(fit, config, std::sqrt(std::max(0.0, stem.covariance(2, 2))))) return true;
-  if (cut.only_clear) return reaches_top(stem, config) && stands_alone(fit, config);
-  if (e.even_arc_deg < kEvenArcShare * stem.arc_deg) return false;
-  // What begins higher is a branch or a crown.
-  if (stem.lowest_m > kBreastHeight + kBeginsAbove || dbh_sd > kDbhSd + kDbhSdShare * dbh)
-    return false;
-  if (stands_alone(fit, config)) return true;
-  // Where points are many, a stem shows in thin slices; what only thick ones show has to be clean.
-  const double clutter = e.inside_ratio + e.outside_ratio;
-  const bool dense = e.on > kDensePointsPerSlice * e.slices;
-  if (cut.min_slices < config.min_slices && dense &&
-      (clutter > kThickOnlyClutter || e.scatter_m > kThickOnlyScatter)) {
-    return false;
-  }
-  return 4 * e.inside <= e.on && e.inside_ratio <= kMostInside &&
-         clutter <= max_clutter(fit, lean_deg) &&
-         e.scatter_m <= std::max(kMostScatter, kMostScatterShare * stem.radius_m) + kScatterSlack;
-}
-
-// After the refined fit, which may have found a much thinner stem in the circle's edge. What shows
-// another side in each slice is a piece of a machine or a heap of branches. A stem's pieces were
-// filled to 0.67 and more on the tuning maps. What shows in few slices has to stand clear, and must
-// not be cut off where it was seen well.
-bool is_stem_still(const StemFitResult& fit, const Cut& cut, const StemDetectorConfig& config) {
-  const StemFit& stem = fit.stem;
-  const StemEvidence& e = fit.evidence;
-  if (!fit.converged || 2.0 * stem.radius_m < config.min_dbh_m ||
-      2.0 * stem.radius_m > config.max_dbh_m || e.returns < config.min_returns ||
-      lean_deg_of(stem) > config.max_lean_deg || stem.arc_deg < config.min_arc_deg ||
-      e.fill < kClearFill) {
-    return false;
-  }
-  if (is_clear_column(fit, config, kClearSpreads * stem.spread_m)) return true;
-  if (e.fill < kLeastFill) return false;
-  if (cut.only_clear) return reaches_top(stem, config) && stands_alone(fit, config);
-  const double all = (config.highest_m - config.lowest_m) / config.slice_m;
-  if (e.slices >= kShownByMost * all) return true;
-  const double sd = std::sqrt(std::max(0.0, stem.covariance(2, 2)));
-  return e.inside_ratio + e.outside_ratio <= kFewSlicesClutter &&
-         sd <= kFewSlicesSd * stem.radius_m &&
-         (e.slices >= kShownByFew * all || e.returns < kWellSeen * e.slices);
-}
-
 bool same_stem(const StemFit& a, const StemFit& b) {
   const double larger = std::max(a.radius_m, b.radius_m);
   const double smaller = std::min(a.radius_m, b.radius_m);
@@ -190,9 +65,11 @@ bool same_stem(const StemFit& a, const StemFit& b) {
          std::max(kSameOfBoth * (larger + smaller), larger + kSameOfSmaller * smaller);
 }
 
-// Best supported first: many returns, evenly on the parts that were seen.
+// Those whose radius the first fit told, then by support: many returns, evenly on the parts that
+// were seen.
 void sort_by_support(std::vector<StemFitResult>& fits) {
   sort_stably(fits, [](const StemFitResult& a, const StemFitResult& b) {
+    if (a.flat != b.flat) return b.flat;
     const double qa = a.evidence.patches * a.evidence.fill;
     const double qb = b.evidence.patches * b.evidence.fill;
     if (qa != qb) return qa > qb;
@@ -233,7 +110,7 @@ void mark_explained(const StemFit& stem, const PointIndex& index,
   });
 }
 
-Cut cut_of(StemCut cut, const StemDetectorConfig& config) {
+SliceCut cut_of(StemCut cut, const StemDetectorConfig& config) {
   if (cut == StemCut::kThin) return {config.slice_m, config.min_slices, kThinReach, kThinBand};
   return {kThickSlices * config.slice_m, kLeastThickSlices, kThickReach, kThickBand};
 }
@@ -296,12 +173,14 @@ std::vector<SlicePoint> unexplained_near(const Search& search, const StemFit& st
 }
 
 // A fit that is a stem by itself, or has not converged.
-StemFitResult fit_start(const Search& search, const StemFit& start, const Cut& cut,
+StemFitResult fit_start(const Search& search, const StemFit& start, const SliceCut& cut,
                         const StemDetectorConfig& config) {
   const std::vector<SlicePoint> near = unexplained_near(search, start, config);
   StemFitResult fit = fit_stem(near, start, config);
-  if (is_stem(fit, cut, config)) {
+  const bool plain = is_stem(fit, cut, config);
+  if (plain || is_flat_column(fit, cut, config)) {
     fit = refine_stem(near, fit, config);
+    fit.flat = !plain;
     if (is_stem_still(fit, cut, config) && is_tree(fit.stem, search.index, search.points, config))
       return fit;
   }
@@ -387,7 +266,7 @@ void add_thinnest_stems(const StemDetectorConfig& config, const StemSearchArea& 
   add_thin_stems(config.min_dbh_m, thin, where, progress, search);
 }
 
-void add_stems(const Cut& cut, const StemDetectorConfig& config, const StemSearchArea& where,
+void add_stems(const SliceCut& cut, const StemDetectorConfig& config, const StemSearchArea& where,
                const ProgressSink& progress, Search& search) {
   const std::vector<Ring> rings =
       find_rings(search.points, search.explained, cut, config, where, progress);
@@ -453,7 +332,7 @@ std::vector<StemFit> detect_hidden_stems(
   Search search(points);
   for (const StemFit& stem : known)
     search.know(seen_from_above(stem, rise));
-  Cut cut = cut_of(StemCut::kThin, config);
+  SliceCut cut = cut_of(StemCut::kThin, config);
   cut.only_clear = true;
   StemDetectorConfig lowered = config;
   lowered.lowest_m = kHiddenLowest;

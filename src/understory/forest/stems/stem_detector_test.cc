@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "understory/forest/stems/stem_fit.h"
@@ -33,6 +34,47 @@ TEST(StemDetector, WhatShowsAnotherSideInEachSliceIsNoStem) {
   std::vector<SlicePoint> pieces = arcs(140.0);
   EXPECT_EQ(detect_stems(stem, {}).size(), 1U);
   EXPECT_TRUE(detect_stems(pieces, {}).empty());
+}
+
+// A stem of 12 cm, seen from the side of -y by beams that are as wide as it. What they meet beside
+// its middle is put on theirs, so its arc looks flat.
+std::vector<SlicePoint> seen_by_wide_beams(std::uint64_t seed) {
+  Random random(seed);
+  std::vector<SlicePoint> points;
+  for (int i = 0; i < 140; ++i) {
+    const double across = random.uniform(-0.06, 0.06);
+    const double depth = -std::sqrt(0.06 * 0.06 - across * across);
+    points.push_back({static_cast<float>(across + random.normal(0.0, 0.04)),
+                      static_cast<float>(depth + random.normal(0.0, 0.008)),
+                      static_cast<float>(random.uniform(0.5, 3.5)), 1});
+  }
+  return points;
+}
+
+TEST(StemDetector, FindsAStemWhoseArcLooksFlatFromAfar) {
+  int found = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    std::vector<SlicePoint> points = seen_by_wide_beams(seed);
+    const std::vector<StemFit> stems = detect_stems(points, {});
+    ASSERT_LE(stems.size(), 1U) << seed;
+    if (!stems.empty() && stems[0].centre.norm() < 0.06 &&
+        std::abs(2.0 * stems[0].radius_m - 0.12) < 0.1)
+      ++found;
+  }
+  EXPECT_GE(found, 18);
+}
+
+TEST(StemDetector, ABoardIsNoStemThoughItStandsClear) {
+  for (const double width : {0.5, 1.0}) {
+    Random random(3);
+    std::vector<SlicePoint> points;
+    for (int i = 0; i < 1500; ++i) {
+      points.push_back({static_cast<float>(width * (random.uniform() - 0.5)),
+                        static_cast<float>(random.normal(0.0, 0.005)),
+                        static_cast<float>(random.uniform(0.5, 3.5)), 1});
+    }
+    EXPECT_TRUE(detect_stems(points, {}).empty()) << width;
+  }
 }
 
 TEST(StemDetector, AThinStemWithWideScatterIsNotTheEdgeOfAThickOne) {

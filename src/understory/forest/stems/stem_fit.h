@@ -31,6 +31,7 @@ struct StemEvidence {
 // weak prior, the slope near the start's. Keeps the slices of `start`.
 struct StemFitResult {
   bool converged = false;
+  bool flat = false;  // the arc that was seen is too flat for a first radius
   StemFit stem;
   StemEvidence evidence;
 };
