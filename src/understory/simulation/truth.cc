@@ -281,7 +281,14 @@ void TruthLog::put_away(Block& block) {
   } catch (const OutputError&) {
     return;
   }
-  block.stems = {};
+  block.stems = std::vector<Packed>();  // `= {}` would keep its memory
+}
+
+std::size_t TruthLog::bytes_in_memory() const {
+  std::size_t stems = read_stems_.capacity();
+  for (const Block& block : blocks_)
+    stems += block.stems.capacity();
+  return stems * sizeof(Packed);
 }
 
 const std::vector<TruthLog::Packed>& TruthLog::read(std::size_t block) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -38,6 +39,8 @@ class TruthLog {
   [[nodiscard]] std::vector<ScanTruth> poses() const;
   // Returns of stems in the i-th scan.
   [[nodiscard]] std::vector<StemReturns> stems(std::size_t i) const;
+  // That the returns of stems take.
+  [[nodiscard]] std::size_t bytes_in_memory() const;
 
  private:
   struct Packed {

@@ -43,6 +43,7 @@ void expect_stems_of(const TruthLog& log, int scan) {
 TEST(TruthLog, GivesBackEachScansStems) {
   TruthLog log;
   fill(log);
+  EXPECT_LE(log.bytes_in_memory(), 1U << 20) << "one block";
   ASSERT_EQ(log.scans().size(), static_cast<std::size_t>(kScans));
   for (int scan = 0; scan < kScans; ++scan)
     expect_stems_of(log, scan);
@@ -61,6 +62,7 @@ TEST(TruthLog, KeepsThemInMemoryWhereThereIsNoFolderForThem) {
   } else {
     setenv("TMPDIR", kept.c_str(), 1);
   }
+  EXPECT_GT(log.bytes_in_memory(), 1U << 20);
   for (const int scan : {0, 7, 999, 500})
     expect_stems_of(log, scan);
 }

@@ -233,7 +233,7 @@ StemFitResult fit_column(const Search& search, const StemFit& column, double mos
   const auto is_thinner = [&](const StemFitResult& fit) {
     return fit.converged && 2.0 * fit.stem.radius_m < most_m;
   };
-  const StemFitResult clear = fit_start(search, column, cut_of(StemCut::kThin, config), config);
+  StemFitResult clear = fit_start(search, column, cut_of(StemCut::kThin, config), config);
   if (is_thinner(clear)) return clear;
   const std::vector<SlicePoint> near = unexplained_near(search, column, config);
   StemFitResult fit = fit_in_foliage(near, column, config);
