@@ -81,7 +81,8 @@ double lean_deg_of(const StemFit& stem) {
   return std::atan(stem.slope.norm()) * 180.0 / M_PI;
 }
 
-bool is_flat_column(const StemFitResult& fit, const SliceCut& cut, const StemDetectorConfig& config) {
+bool is_flat_column(const StemFitResult& fit, const SliceCut& cut,
+                    const StemDetectorConfig& config) {
   const StemFit& stem = fit.stem;
   const StemEvidence& e = fit.evidence;
   return has_points_of_stem(fit, cut, config) &&
@@ -98,8 +99,7 @@ bool is_stem(const StemFitResult& fit, const SliceCut& cut, const StemDetectorCo
   const double dbh_sd = 2.0 * std::sqrt(std::max(0.0, stem.covariance(2, 2)));
   const double lean_deg = lean_deg_of(stem);
   if (!has_points_of_stem(fit, cut, config) || dbh > config.max_dbh_m ||
-      stem.arc_deg < config.min_arc_deg ||
-      e.even_arc_deg < kEvenArcOfLeast * config.min_arc_deg) {
+      stem.arc_deg < config.min_arc_deg || e.even_arc_deg < kEvenArcOfLeast * config.min_arc_deg) {
     return false;
   }
   if (is_clear_column(fit, config, std::sqrt(std::max(0.0, stem.covariance(2, 2))))) return true;
@@ -123,7 +123,8 @@ bool is_stem(const StemFitResult& fit, const SliceCut& cut, const StemDetectorCo
 
 // A stem's pieces were filled to 0.67 and more on the tuning maps. What shows in few slices has to
 // stand clear, and must not be cut off where it was seen well.
-bool is_stem_still(const StemFitResult& fit, const SliceCut& cut, const StemDetectorConfig& config) {
+bool is_stem_still(const StemFitResult& fit, const SliceCut& cut,
+                   const StemDetectorConfig& config) {
   const StemFit& stem = fit.stem;
   const StemEvidence& e = fit.evidence;
   if (!fit.converged || 2.0 * stem.radius_m < config.min_dbh_m ||
