@@ -45,18 +45,25 @@ bool reaches_top(const StemFit& stem, const StemDetectorConfig& config) {
   return stem.highest_m > config.highest_m - config.slice_m;
 }
 
-// A column with hardly a point beside or inside it, from bottom to top: a stem that was seen from
-// one side, from afar. Its diameter may be uncertain, and what stands before it may hide its foot.
-// `radius_sd_m`: of the radius at breast height.
+// Hardly a point lies beside or inside it over some height, and there is no gap in it.
+bool stands_clear(const StemFitResult& fit, const StemDetectorConfig& config) {
+  const StemFit& stem = fit.stem;
+  const StemEvidence& e = fit.evidence;
+  return e.inside_ratio + e.outside_ratio <= kClearClutter && lean_deg_of(stem) <= kAloneLeanDeg &&
+         stem.highest_m - stem.lowest_m >= kClearExtent &&
+         e.slices >= kAloneSlices * slices_between(stem, config);
+}
+
+// A column that stands clear up to the top: a stem that was seen from one side, from afar. Its
+// diameter may be uncertain, and what stands before it may hide its foot. `radius_sd_m`: of the
+// radius at breast height.
 bool is_clear_column(const StemFitResult& fit, const StemDetectorConfig& config,
                      double radius_sd_m) {
   const StemFit& stem = fit.stem;
   const StemEvidence& e = fit.evidence;
-  return e.inside_ratio + e.outside_ratio <= kClearClutter && lean_deg_of(stem) <= kAloneLeanDeg &&
-         stem.highest_m - stem.lowest_m >= kClearExtent && reaches_top(stem, config) &&
-         stem.lowest_m <= kBreastHeight + kClearBeginsAbove &&
-         e.slices >= kAloneSlices * slices_between(stem, config) &&
-         e.even_arc_deg >= kClearArcDeg && e.scatter_m <= kClearScatterShare * stem.radius_m &&
+  return stands_clear(fit, config) && reaches_top(stem, config) &&
+         stem.lowest_m <= kBreastHeight + kClearBeginsAbove && e.even_arc_deg >= kClearArcDeg &&
+         e.scatter_m <= kClearScatterShare * stem.radius_m &&
          radius_sd_m <= kClearSd * stem.radius_m;
 }
 
@@ -83,13 +90,8 @@ double lean_deg_of(const StemFit& stem) {
 
 bool is_flat_column(const StemFitResult& fit, const SliceCut& cut,
                     const StemDetectorConfig& config) {
-  const StemFit& stem = fit.stem;
-  const StemEvidence& e = fit.evidence;
-  return has_points_of_stem(fit, cut, config) &&
-         e.inside_ratio + e.outside_ratio <= kClearClutter && lean_deg_of(stem) <= kAloneLeanDeg &&
-         stem.highest_m - stem.lowest_m >= kClearExtent &&
-         stem.lowest_m <= kBreastHeight + kBeginsAbove &&
-         e.slices >= kAloneSlices * slices_between(stem, config);
+  return has_points_of_stem(fit, cut, config) && stands_clear(fit, config) &&
+         fit.stem.lowest_m <= kBreastHeight + kBeginsAbove;
 }
 
 bool is_stem(const StemFitResult& fit, const SliceCut& cut, const StemDetectorConfig& config) {

@@ -15,7 +15,7 @@ struct SliceCut {
   bool only_clear = false;  // columns that stand clear or alone, and nothing else
 };
 
-// Of the centre line, from the vertical.
+// Degrees between the centre line and the vertical, 0 to 90.
 [[nodiscard]] double lean_deg_of(const StemFit& stem);
 
 // Is the first fit a stem, or a bush that a cone happens to fit? Ours: no paper names these tests.
