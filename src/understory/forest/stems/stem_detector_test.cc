@@ -36,17 +36,28 @@ TEST(StemDetector, WhatShowsAnotherSideInEachSliceIsNoStem) {
   EXPECT_TRUE(detect_stems(pieces, {}).empty());
 }
 
-// A stem of 12 cm, seen from the side of -y by beams that are as wide as it. What they meet beside
-// its middle is put on theirs, so its arc looks flat.
-std::vector<SlicePoint> seen_by_wide_beams(std::uint64_t seed) {
+// A stem seen from the side of -y. Beams that are as wide as it spread the points across. What they
+// meet beside its middle is put on theirs, so its arc looks flat.
+struct SeenStem {
+  double radius_m = 0.06;
+  double arc_deg = 180.0;  // that the beams meet
+  double across_m = 0.04;  // standard deviation of the spread
+  double along_m = 0.008;  // the same along the beams
+  double lowest_m = 0.5;
+  double highest_m = 3.5;
+  int points = 140;
+};
+
+std::vector<SlicePoint> points_of(const SeenStem& stem, std::uint64_t seed) {
   Random random(seed);
   std::vector<SlicePoint> points;
-  for (int i = 0; i < 140; ++i) {
-    const double across = random.uniform(-0.06, 0.06);
-    const double depth = -std::sqrt(0.06 * 0.06 - across * across);
-    points.push_back({static_cast<float>(across + random.normal(0.0, 0.04)),
-                      static_cast<float>(depth + random.normal(0.0, 0.008)),
-                      static_cast<float>(random.uniform(0.5, 3.5)), 1});
+  for (int i = 0; i < stem.points; ++i) {
+    const double most = std::sin(0.5 * stem.arc_deg * M_PI / 180.0);
+    const double angle = std::asin(random.uniform(-most, most)) - 0.5 * M_PI;
+    points.push_back(
+        {static_cast<float>(stem.radius_m * std::cos(angle) + random.normal(0.0, stem.across_m)),
+         static_cast<float>(stem.radius_m * std::sin(angle) + random.normal(0.0, stem.along_m)),
+         static_cast<float>(random.uniform(stem.lowest_m, stem.highest_m)), 1});
   }
   return points;
 }
@@ -54,7 +65,7 @@ std::vector<SlicePoint> seen_by_wide_beams(std::uint64_t seed) {
 TEST(StemDetector, FindsAStemWhoseArcLooksFlatFromAfar) {
   int found = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    std::vector<SlicePoint> points = seen_by_wide_beams(seed);
+    std::vector<SlicePoint> points = points_of({}, seed);
     const std::vector<StemFit> stems = detect_stems(points, {});
     ASSERT_LE(stems.size(), 1U) << seed;
     if (!stems.empty() && stems[0].centre.norm() < 0.06 &&
@@ -64,17 +75,18 @@ TEST(StemDetector, FindsAStemWhoseArcLooksFlatFromAfar) {
   EXPECT_GE(found, 18);
 }
 
-TEST(StemDetector, ABoardIsNoStemThoughItStandsClear) {
-  for (const double width : {0.5, 1.0}) {
-    Random random(3);
-    std::vector<SlicePoint> points;
-    for (int i = 0; i < 1500; ++i) {
-      points.push_back({static_cast<float>(width * (random.uniform() - 0.5)),
-                        static_cast<float>(random.normal(0.0, 0.005)),
-                        static_cast<float>(random.uniform(0.5, 3.5)), 1});
-    }
-    EXPECT_TRUE(detect_stems(points, {}).empty()) << width;
+// The same points suit several first fits. Those whose radius is known come first: 43 of 60 are
+// right without that.
+TEST(StemDetector, AFlatArcGivesWayToOneThatTellsARadius) {
+  int right = 0;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    std::vector<SlicePoint> points = points_of(
+        {.radius_m = 0.0855, .arc_deg = 112.0, .across_m = 0.045, .along_m = 0.022, .points = 347},
+        seed);
+    const std::vector<StemFit> stems = detect_stems(points, {});
+    if (stems.size() == 1 && std::abs(stems[0].radius_m - 0.0855) < 0.02) ++right;
   }
+  EXPECT_GE(right, 46);
 }
 
 TEST(StemDetector, AThinStemWithWideScatterIsNotTheEdgeOfAThickOne) {
