@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "understory/map/map_tiles.h"
+#include "understory/map/clouds/map_tiles.h"
 
 namespace understory {
 

@@ -63,6 +63,15 @@ inline constexpr double kTail = 0.05;
 inline constexpr double kWidestRangeM = 2.0;
 }  // namespace foot_heights
 
+namespace near_columns {  // map/clouds/near_columns.cc
+// m: edge of a column [chosen: a stem and what hides it]
+inline constexpr double kColumnM = 0.5;
+// One point of so many is looked at [bound: time]
+inline constexpr std::size_t kEachOf = 4;
+// of those in a column, for it to be seen well [chosen: 20 points]
+inline constexpr std::uint32_t kFewestPoints = 5;
+}  // namespace near_columns
+
 namespace stem_map {  // map/stem_map.cc
 // views that should have seen both of two trees; with fewer nothing is told [chosen]
 inline constexpr double kEnoughViews = 3.0;

@@ -14,7 +14,7 @@
 #include "understory/map/keyframes/keyframe_map.h"
 #include "understory/map/keyframes/keyframe_points.h"
 #include "understory/map/local_map.h"
-#include "understory/map/map_tiles.h"
+#include "understory/map/clouds/map_tiles.h"
 #include "understory/util/error.h"
 #include "understory/util/files/folder_test_support.h"
 #include "understory/util/random.h"

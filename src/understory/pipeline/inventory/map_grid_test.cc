@@ -3,7 +3,7 @@
 #include <string>
 
 #include "understory/georeference/systems/layer_frame.h"
-#include "understory/map/map_tiles.h"
+#include "understory/map/clouds/map_tiles.h"
 #include "understory/output/layers/layer_files.h"
 #include "understory/util/random.h"
 

@@ -12,7 +12,7 @@
 #include "understory/forest/cloud_shape.h"
 #include "understory/geometry/rotation_between.h"
 #include "understory/georeference/systems/coordinate_system.h"
-#include "understory/map/map_tiles.h"
+#include "understory/map/clouds/map_tiles.h"
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/util/error.h"
 

@@ -72,6 +72,13 @@ void suit_sparse_scans(const DenseMappingConfig& config, const SensorTraits& tra
   changes.at_most("map.cloud_distance_m", config.cloud_distance_m, kSparseCloudM, why);
 }
 
+// Trees far from the path show little in few clouds.
+void suit_full_inventory(const DenseMappingConfig& config, Changes& changes) {
+  if (config.inventory.extent != InventoryExtent::kFull) return;
+  changes.set("map.far_cloud_distance_m", fmt::format("{}", kFarCloudM),
+              "a full inventory: more points of trees far from the path");
+}
+
 // Without an IMU predictions are often far off.
 void suit_scans_alone(const DenseMappingConfig& config, const SensorTraits& traits,
                       const RunConditions& conditions, Changes& changes) {
@@ -115,6 +122,7 @@ Adapted<DenseMappingConfig> adapt(const DenseMappingConfig& asked, const ConfigO
   if (conditions.realtime) changes.set("time_repair.window_s", "0", kLive);
   suit_sparse_scans(asked, traits, changes);
   suit_scans_alone(asked, traits, conditions, changes);
+  suit_full_inventory(asked, changes);
   if (!conditions.imu_refused.empty()) {
     changes.set_anyway("motion.imu_enabled", "false", conditions.imu_refused,
                        conditions.imu_judged_s);

@@ -26,7 +26,7 @@ TEST(FinishedMap, CloudsMoveWithTheirKeyframes) {
   MapTiles::Config config;
   config.thin_m = 0.0;
   LeftOutCarrier none;
-  const auto tiles = make_finished_map(clouds, keyframes, config, folder / "tiles", none,
+  const auto tiles = make_finished_map({clouds}, keyframes, config, folder / "tiles", none,
                                        [](const ProgressReport&) {});
   std::map<std::uint16_t, std::pair<Eigen::Vector3d, TimeNs>> found;
   tiles->for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
@@ -53,7 +53,7 @@ TEST(FinishedMap, TheCarrierIsLeftOut) {
   // Two voxels along each axis to each side of the lidar, all filled.
   LeftOutCarrier carrier{CarrierRegion({1.0, 0.0, 0.0}, 0.4, std::vector<std::uint8_t>(64, 1)),
                          path};
-  const auto tiles = make_finished_map(clouds, keyframes, {}, folder / "tiles", carrier, {});
+  const auto tiles = make_finished_map({clouds}, keyframes, {}, folder / "tiles", carrier, {});
   std::vector<std::uint16_t> kept;
   tiles->for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
     for (const MapPoint& p : points)
@@ -62,6 +62,31 @@ TEST(FinishedMap, TheCarrierIsLeftOut) {
   EXPECT_EQ(kept, std::vector<std::uint16_t>{6});
   EXPECT_EQ(carrier.points, 1U);
   EXPECT_EQ(carrier.of, 2U);
+}
+
+// A far cloud adds what no other one shows from near.
+TEST(FinishedMap, FarPointsEnterWhereNothingIsSeenFromNear) {
+  const test::TemporaryFolder folder;
+  KeyframeClouds whole(folder / "clouds.bin");
+  KeyframeClouds far(folder / "far_clouds.bin");
+  KeyframeCloud near_stem{0, 0, {}, {}};
+  for (int i = 0; i < 40; ++i)
+    near_stem.points.push_back({5.1F, 0.1F, 0.05F * static_cast<float>(i), 5, 0});
+  whole.append(near_stem);
+  far.append({0, 0, {{25.1F, 0.1F, 1.0F, 6, 0}, {15.1F, 0.1F, 1.0F, 7, 0}},
+              Pose(Eigen::Quaterniond::Identity(), {-10.0, 0.0, 0.0})});
+  const std::vector<Keyframe> keyframes(1);
+  LeftOutCarrier none;
+  const auto tiles = make_finished_map({whole, &far, 12.0}, keyframes, {}, folder / "tiles", none,
+                                       [](const ProgressReport&) {});
+  std::map<std::uint16_t, int> found;
+  tiles->for_each([&](MapTiles::TileIndex, const std::vector<MapPoint>& points) {
+    for (const MapPoint& p : points)
+      ++found[p.intensity];
+  });
+  EXPECT_EQ(found[5], 40);
+  EXPECT_EQ(found[6], 1);
+  EXPECT_EQ(found[7], 0);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "understory/forest/tiles/tiled_cloud.h"
-#include "understory/map/map_tiles.h"
+#include "understory/map/clouds/map_tiles.h"
 #include "understory/util/files/scratch_file.h"
 
 namespace understory {

@@ -196,6 +196,10 @@ void DenseFrontEnd::start_anew() {
   journal_ = std::make_unique<Journal>(folder_ / kJournalFile);
   begin_paths_between();
   clouds_ = std::make_unique<ScanClouds>(clouds_config(), folder_ / kCloudsFile, times_);
+  if (keeps_far_clouds()) {
+    far_clouds_ =
+        std::make_unique<ScanClouds>(far_clouds_config(), folder_ / kFarCloudsFile, times_);
+  }
   map_->start();
   make_odometry(rig_);
   make_satellites();
@@ -458,11 +462,33 @@ ScanCloudsConfig DenseFrontEnd::clouds_config() const {
   return clouds;
 }
 
+bool DenseFrontEnd::keeps_far_clouds() const {
+  return config_.map_enabled && config_.far_cloud_distance_m > 0.0 &&
+         config_.far_cloud_distance_m < config_.cloud_distance_m;
+}
+
+// Far points lie farther from each other than a cloud is thinned.
+ScanCloudsConfig DenseFrontEnd::far_clouds_config() const {
+  ScanCloudsConfig clouds = clouds_config();
+  clouds.distance_m = config_.far_cloud_distance_m;
+  clouds.range_min_m = std::max(clouds.range_min_m, config_.far_m);
+  clouds.thin_m = 0.0;
+  return clouds;
+}
+
 // Perhaps keeps what a scan adds to the finished map.
 void DenseFrontEnd::offer_cloud(const DenseEstimate& estimate, std::size_t keyframe,
                                 const Pose& keyframe_from_body) {
-  clouds_->offer(estimate.cloud, estimate.state.world_from_body, keyframe, keyframe_from_body,
-                 map_->keyframes());
+  const auto offer_to = [&](ScanClouds& clouds) {
+    return clouds.offer(estimate.cloud, estimate.state.world_from_body, keyframe,
+                        keyframe_from_body, map_->keyframes());
+  };
+  const bool kept = offer_to(*clouds_);
+  if (!far_clouds_) return;
+  if (kept)
+    far_clouds_->pass_over(keyframe, keyframe_from_body);
+  else
+    offer_to(*far_clouds_);
 }
 
 }  // namespace understory

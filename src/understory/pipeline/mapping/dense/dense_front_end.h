@@ -12,7 +12,7 @@
 #include "understory/calibration/lidar_imu/online_calibration.h"
 #include "understory/georeference/satellites/satellite_belief.h"
 #include "understory/map/keyframes/keyframe_map.h"
-#include "understory/map/scan_clouds.h"
+#include "understory/map/clouds/scan_clouds.h"
 #include "understory/odometry/dense/dense_odometry.h"
 #include "understory/odometry/dense/recovery.h"
 #include "understory/odometry/dense/start_in_motion.h"
@@ -118,6 +118,10 @@ class DenseFrontEnd : public FrontEnd {
   // A pose for each part of each scan but the first; null with `scan_fraction` 1.
   [[nodiscard]] RelativePath* partial_path() { return partial_path_.get(); }
   [[nodiscard]] const KeyframeClouds& clouds() const { return clouds_->clouds(); }
+  // Those between them, of what is far; null without `map.far_cloud_distance_m`.
+  [[nodiscard]] const KeyframeClouds* far_clouds() const {
+    return far_clouds_ ? &far_clouds_->clouds() : nullptr;
+  }
   // All fixes so far, which lie on disk: read anew at each call.
   [[nodiscard]] std::vector<GnssFix> fixes() const;
   [[nodiscard]] std::size_t fix_count() const;
@@ -133,6 +137,7 @@ class DenseFrontEnd : public FrontEnd {
  private:
   static constexpr const char* kJournalFile = "journal.bin";
   static constexpr const char* kCloudsFile = "clouds.bin";
+  static constexpr const char* kFarCloudsFile = "far_clouds.bin";
   static constexpr const char* kImuPathFile = "imu_path.bin";
   static constexpr const char* kPartialPathFile = "partial_path.bin";
 
@@ -181,6 +186,8 @@ class DenseFrontEnd : public FrontEnd {
   void move_world(const Pose& new_world_from_old_world);
   [[nodiscard]] FeaturePoints map_points(const DenseEstimate& estimate);
   [[nodiscard]] ScanCloudsConfig clouds_config() const;
+  [[nodiscard]] ScanCloudsConfig far_clouds_config() const;
+  [[nodiscard]] bool keeps_far_clouds() const;
   void offer_cloud(const DenseEstimate& estimate, std::size_t keyframe,
                    const Pose& keyframe_from_body);
   void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
@@ -201,6 +208,7 @@ class DenseFrontEnd : public FrontEnd {
   std::unique_ptr<RelativePath> imu_path_;
   std::unique_ptr<RelativePath> partial_path_;
   std::unique_ptr<ScanClouds> clouds_;
+  std::unique_ptr<ScanClouds> far_clouds_;  // null where none are kept
   VoxelFilter cloud_filter_;
   std::unique_ptr<RecordFile> fixes_file_;  // null until fixes were put away
   TimeNs last_scan_end_ = 0;

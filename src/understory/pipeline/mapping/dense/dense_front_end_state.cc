@@ -9,6 +9,18 @@ namespace {
 
 constexpr const char* kFixesFile = "fixes.bin";
 
+void put_last(BinaryWriter& writer, const ScanClouds::Last& last) {
+  writer.put(last.keyframe);
+  put_pose(writer, last.keyframe_from_body);
+}
+
+ScanClouds::Last get_last(BinaryReader& reader) {
+  ScanClouds::Last last;
+  last.keyframe = reader.get<std::uint64_t>();
+  last.keyframe_from_body = get_pose(reader);
+  return last;
+}
+
 }  // namespace
 
 void DenseFrontEnd::sync() {
@@ -19,6 +31,7 @@ void DenseFrontEnd::sync() {
   if (imu_path_) imu_path_->sync();
   if (partial_path_) partial_path_->sync();
   clouds_->sync();
+  if (far_clouds_) far_clouds_->sync();
   map_->sync();
 }
 
@@ -28,6 +41,7 @@ std::vector<CountedFile> DenseFrontEnd::files() const {
     files = map_->files();
     files.push_back({kJournalFile, journal_->count()});
     files.push_back({kCloudsFile, clouds_->clouds().count()});
+    if (far_clouds_) files.push_back({kFarCloudsFile, far_clouds_->clouds().count()});
     if (imu_path_) files.push_back({kImuPathFile, imu_path_->count()});
     if (partial_path_) files.push_back({kPartialPathFile, partial_path_->count()});
   }
@@ -47,9 +61,6 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   received_.clock.save(writer);
   if (received_.calibration) received_.calibration->save(writer);
   writer.put(last_scan_end_);
-  const ScanClouds::Last last_cloud = clouds_ ? clouds_->last() : ScanClouds::Last();
-  writer.put(last_cloud.keyframe);
-  put_pose(writer, last_cloud.keyframe_from_body);
   recovery_.save(writer);
   put_optional(writer, rig_.body_from_imu, put_pose);
   put_optional(writer, rig_.body_from_gnss, put_pose);
@@ -62,7 +73,11 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
   writer.put(journal_->count());
   if (imu_path_) writer.put(imu_path_->count());
   if (partial_path_) writer.put(partial_path_->count());
-  writer.put(clouds_->clouds().count());
+  for (const ScanClouds* clouds : {clouds_.get(), far_clouds_.get()}) {
+    if (clouds == nullptr) continue;
+    put_optional(writer, clouds->last(), put_last);
+    writer.put(clouds->clouds().count());
+  }
   map_->save(writer);
   odometry_->save(writer);
   if (satellites_) satellites_->save(writer);
@@ -109,9 +124,6 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   received_.clock.load(reader);
   if (received_.calibration) received_.calibration->load(reader);
   last_scan_end_ = reader.get<TimeNs>();
-  ScanClouds::Last last_cloud;
-  last_cloud.keyframe = reader.get<std::uint64_t>();
-  last_cloud.keyframe_from_body = get_pose(reader);
   recovery_.load(reader);
   const auto body_from_imu = get_optional(reader, get_pose);
   const auto body_from_gnss = get_optional(reader, get_pose);
@@ -123,9 +135,13 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   if (!was_started) return;
   journal_ = std::make_unique<Journal>(folder_ / kJournalFile, reader.get<RecordCount>());
   load_paths_between(reader);
-  const auto clouds = reader.get<RecordCount>();
-  clouds_ = std::make_unique<ScanClouds>(clouds_config(), folder_ / kCloudsFile, clouds, last_cloud,
-                                         times_);
+  const auto load_clouds = [&](const ScanCloudsConfig& config, const char* file) {
+    const auto last = get_optional(reader, get_last);
+    const auto known = reader.get<RecordCount>();
+    return std::make_unique<ScanClouds>(config, folder_ / file, known, last, times_);
+  };
+  clouds_ = load_clouds(clouds_config(), kCloudsFile);
+  if (keeps_far_clouds()) far_clouds_ = load_clouds(far_clouds_config(), kFarCloudsFile);
   opening_.reset();
   rig_ = rig;
   rig_.body_from_imu = body_from_imu;

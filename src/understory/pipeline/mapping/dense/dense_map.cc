@@ -48,7 +48,9 @@ class DenseMap : public MapMaker {
     if (!front_end_.config().map_enabled) return;
     find_own_points();
     const ScopedTimer timer(front_end_.times(), "finish_gather_map");
-    made_.tiles = make_finished_map(front_end_.clouds(), front_end_.map().keyframes(),
+    const MapClouds map_clouds{front_end_.clouds(), front_end_.far_clouds(),
+                               front_end_.config().far_m};
+    made_.tiles = make_finished_map(map_clouds, front_end_.map().keyframes(),
                                     front_end_.config().map, recording_.work / "tiles",
                                     made_.carrier, recording_.progress);
   }

@@ -9,7 +9,7 @@
 #include "understory/georeference/satellites/satellite_belief.h"
 #include "understory/map/carrier_region.h"
 #include "understory/map/keyframes/keyframe_map.h"
-#include "understory/map/map_tiles.h"
+#include "understory/map/clouds/map_tiles.h"
 #include "understory/odometry/dense/dense_odometry.h"
 #include "understory/pipeline/georeferencing/gnss_in_graph.h"
 #include "understory/pipeline/georeferencing/run_place.h"
@@ -48,6 +48,10 @@ struct DenseMappingConfig {
   JudgementConfig judgement;
   MotionLimits motion_limits;
   double cloud_distance_m = 1.0;  // weighted distance (37) between scans whose clouds are kept
+  // The same between scans of which only what is far is kept; 0: none. adapt() sets it for a full
+  // inventory.
+  double far_cloud_distance_m = 0.0;
+  double far_m = 12.0;  // from the lidar on: what is far
   // A lidar whose full scans have fewer points than this (16 beams) gets other settings, where
   // nobody set them (adapt()). Thinned like dense scans, its scans would leave too few points in a
   // cell.

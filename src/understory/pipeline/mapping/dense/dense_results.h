@@ -5,7 +5,7 @@
 #include <string>
 
 #include "understory/forest/inventory.h"
-#include "understory/map/map_tiles.h"
+#include "understory/map/clouds/map_tiles.h"
 #include "understory/output/run_summary.h"
 #include "understory/pipeline/georeferencing/map_placing.h"
 #include "understory/pipeline/inventory/stand_plots.h"

@@ -1,4 +1,4 @@
-#include "understory/map/scan_clouds.h"
+#include "understory/map/clouds/scan_clouds.h"
 
 #include <gtest/gtest.h>
 
@@ -51,6 +51,14 @@ TEST_F(ScanCloudsTest, KeepsScansThatLieFarEnoughFromTheLastOneKept) {
   EXPECT_EQ(clouds.clouds().size(), 2U);
 }
 
+TEST_F(ScanCloudsTest, AScanThatIsKeptElsewhereCountsAsTheLastOne) {
+  ScanClouds clouds(config_, folder_ / "clouds", times_);
+  clouds.pass_over(0, pose_along_x(0.0));
+  EXPECT_FALSE(clouds.offer(row_of(8), pose_along_x(0.9), 0, pose_along_x(0.9), keyframes_));
+  EXPECT_TRUE(clouds.offer(row_of(8), pose_along_x(1.1), 0, pose_along_x(1.1), keyframes_));
+  EXPECT_EQ(clouds.clouds().size(), 1U);
+}
+
 TEST_F(ScanCloudsTest, KeepsPointsInRangeWithTheirTimes) {
   ScanClouds clouds(config_, folder_ / "clouds", times_);
   clouds.offer(row_of(8), pose_along_x(0.0), 0, pose_along_x(0.0), keyframes_);
@@ -71,7 +79,7 @@ TEST_F(ScanCloudsTest, ThinsACloud) {
 
 TEST_F(ScanCloudsTest, GoesOnWhereItWas) {
   RecordCount known;
-  ScanClouds::Last last;
+  std::optional<ScanClouds::Last> last;
   {
     ScanClouds clouds(config_, folder_ / "clouds", times_);
     clouds.offer(row_of(8), pose_along_x(2.0), 0, pose_along_x(2.0), keyframes_);

@@ -1,4 +1,4 @@
-#include "understory/map/map_tiles.h"
+#include "understory/map/clouds/map_tiles.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "understory/map/scan_clouds.h"
+#include "understory/map/clouds/scan_clouds.h"
 
 #include <algorithm>
 #include <numeric>
@@ -17,20 +17,21 @@ ScanClouds::ScanClouds(const ScanCloudsConfig& config, const std::filesystem::pa
     : config_(config), times_(times), clouds_(path) {}
 
 ScanClouds::ScanClouds(const ScanCloudsConfig& config, const std::filesystem::path& path,
-                       const RecordCount& known, const Last& last, StageTimes& times)
+                       const RecordCount& known, const std::optional<Last>& last,
+                       StageTimes& times)
     : config_(config), times_(times), clouds_(path, known), last_(last) {}
 
-void ScanClouds::offer(const BodyCloud& cloud, const Pose& world_from_body, std::size_t keyframe,
+bool ScanClouds::offer(const BodyCloud& cloud, const Pose& world_from_body, std::size_t keyframe,
                        const Pose& keyframe_from_body, const std::vector<Keyframe>& keyframes) {
-  if (!config_.enabled) return;
-  if (clouds_.size() > 0) {
+  if (!config_.enabled) return false;
+  if (last_) {
     const Pose world_from_last =
-        keyframes[last_.keyframe].world_from_body * last_.keyframe_from_body;
+        keyframes[last_->keyframe].world_from_body * last_->keyframe_from_body;
     if (keyframe_distance(world_from_last, world_from_body, config_.keyframe) < config_.distance_m)
-      return;
+      return false;
   }
   const ScopedTimer timer(times_, "store");
-  last_ = {keyframe, keyframe_from_body};
+  pass_over(keyframe, keyframe_from_body);
   KeyframeCloud stored{static_cast<std::int32_t>(keyframe), cloud.stamp, {}, keyframe_from_body};
   const std::vector<std::uint32_t> kept = thinned(cloud);
   const auto nearest = static_cast<float>(config_.range_min_m);
@@ -43,6 +44,11 @@ void ScanClouds::offer(const BodyCloud& cloud, const Pose& world_from_body, std:
                              clamp_to_u16(static_cast<double>(cloud.t_ns[i]) * 1e-4)});
   }
   clouds_.append(stored);
+  return true;
+}
+
+void ScanClouds::pass_over(std::size_t keyframe, const Pose& keyframe_from_body) {
+  last_ = Last{keyframe, keyframe_from_body};
 }
 
 std::vector<std::uint32_t> ScanClouds::thinned(const BodyCloud& cloud) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "understory/map/keyframes/keyframe_clouds.h"
@@ -27,7 +28,7 @@ struct ScanCloudsConfig {
 // OutputError where the disk is full, InputError where the file is damaged.
 class ScanClouds {
  public:
-  // The scan whose cloud was kept last.
+  // The scan whose cloud was kept last, here or elsewhere.
   struct Last {
     std::uint64_t keyframe = 0;
     Pose keyframe_from_body;
@@ -37,15 +38,19 @@ class ScanClouds {
   ScanClouds(const ScanCloudsConfig& config, const std::filesystem::path& path, StageTimes& times);
   // Goes on behind the clouds that are `known`.
   ScanClouds(const ScanCloudsConfig& config, const std::filesystem::path& path,
-             const RecordCount& known, const Last& last, StageTimes& times);
+             const RecordCount& known, const std::optional<Last>& last, StageTimes& times);
 
   // Keeps the cloud if the scan lies far enough from the last one that was kept, by the poses that
-  // keyframes have now. `keyframe`: the one it belongs to, which may be the next to come.
-  void offer(const BodyCloud& cloud, const Pose& world_from_body, std::size_t keyframe,
+  // keyframes have now. `keyframe`: the one it belongs to, which may be the next to come. True if
+  // it is kept.
+  bool offer(const BodyCloud& cloud, const Pose& world_from_body, std::size_t keyframe,
              const Pose& keyframe_from_body, const std::vector<Keyframe>& keyframes);
 
+  // The scan there is kept elsewhere: the next ones are to lie far enough from it.
+  void pass_over(std::size_t keyframe, const Pose& keyframe_from_body);
+
   [[nodiscard]] const KeyframeClouds& clouds() const { return clouds_; }
-  [[nodiscard]] const Last& last() const { return last_; }
+  [[nodiscard]] const std::optional<Last>& last() const { return last_; }
   void sync() { clouds_.sync(); }
 
  private:
@@ -55,7 +60,7 @@ class ScanClouds {
   StageTimes& times_;
   KeyframeClouds clouds_;
   VoxelFilter filter_;
-  Last last_;
+  std::optional<Last> last_;
 };
 
 }  // namespace understory
