@@ -4,7 +4,8 @@
 //   stem_sizes fit FILE [FILE ...]        fits them; prints a table (CSV) with a row for each stem
 // TRUTH is the folder of `understory simulate --set truth.points=true`, SENSOR a name of the
 // setting beam.sensor ("unknown": no footprints). Stems within 30 m of the true path are taken that
-// stand within 0.5 m of a true tree. benchmarks/stem_sizes.py fits the constants of diameter_sd_m.
+// stand within 0.5 m of a true tree. benchmarks/stem_sizes.py fits the constants of diameter_sd_m
+// and of excess_radius_m.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -149,11 +150,12 @@ void fit(const std::string& path) {
     BeamConfig beams;
     beams.sensor = static_cast<LidarSensor>(kept.sensor);
     const BeamFootprint beam = footprint_at(beams, kept.range_m);
-    const double excess = excess_radius_m(beam, stem.radius_m, stem.arc_deg);
-    std::printf("%s,%d,%.3f,%.3f,%.5f,%.5f,%.5f,%.6f,%.1f,%d,%.5f,%.4f\n",
+    const double excess = excess_radius_m(beam, stem.radius_m, stem.arc_deg, stem.scatter_m);
+    std::printf("%s,%d,%.3f,%.3f,%.5f,%.5f,%.5f,%.6f,%.1f,%d,%.5f,%.4f,%.5f,%.5f\n",
                 std::filesystem::path(path).stem().c_str(), kept.sensor, kept.path_m, kept.range_m,
                 kept.true_dbh_m, 2.0 * stem.radius_m, 2.0 * excess, stem.spread_m, stem.arc_deg,
-                stem.returns, last.evidence.scatter_m, beam.signal > 0.0 ? 1.0 / beam.signal : 0.0);
+                stem.returns, last.evidence.scatter_m, beam.signal > 0.0 ? 1.0 / beam.signal : 0.0,
+                beam.sd_m, excess_width_m(beam, stem.radius_m));
   }
 }
 
@@ -168,7 +170,7 @@ int main(int argc, char** argv) {
   } else if (mode == "fit") {
     std::printf(
         "cloud,sensor,path_m,range_m,true_m,dbh_m,excess_m,spread_m,arc_deg,returns,scatter_m,"
-        "weakness\n");
+        "weakness,beam_m,width_m\n");
     for (int i = 2; i < argc; ++i)
       fit(argv[i]);
   } else {

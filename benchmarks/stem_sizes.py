@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Errors of diameters by distance and size, and the constants of diameter_sd_m fitted to them.
 
-    build/benchmarks/stem_sizes fit FILE ... | benchmarks/stem_sizes.py [--fit]
+    build/benchmarks/stem_sizes fit FILE ... | benchmarks/stem_sizes.py [--fit] [--fit-radius]
 
 The table gives bias, RMSE and how many errors lie within one and two standard deviations. Rows are beams
 that are known (compensated), beams that are not, and a cloud of which the ranges are not known, either.
---fit searches constants with which 68 % and 95 % do so in each class of 30 stems and more. Needs numpy.
+--fit searches constants with which 68 % and 95 % do so in each class of 30 stems and more. --fit-radius fits those of
+excess_radius_m to stems whose beams are known, each cloud with the root of its number of stems. Needs numpy.
 """
 import io
 import sys
@@ -15,8 +16,9 @@ import numpy as np
 DISTANCES = [(0, 4), (4, 8), (8, 15), (15, 22), (22, 30)]
 SIZES = [(0.05, 0.10), (0.10, 0.20), (0.20, 9.0)]
 FEWEST = 30
+THIN_RADIUS = 0.03  # m: kThinRadius
 # As in src/understory/forest/stem_constants.h, namespace beam_footprint; metres.
-CONSTANTS = {"known": [2.8, 0.0039, 0.0021, 0.056], "wide": [2.6, 0.0049, 0.0043, 0.018], "bare": [6.0, 0.003, 0.024]}
+CONSTANTS = {"known": [2.3, 0.0057, 0.0023, 0.0074], "wide": [2.6, 0.0049, 0.0043, 0.018], "bare": [6.0, 0.003, 0.024]}
 
 
 def terms_of(kind, rows):
@@ -63,6 +65,23 @@ def fitted(terms, errors, groups):
     return best[1]
 
 
+def fit_radius(rows):
+    """kOneSided, kAllSides and kScatter of excess_radius_m by robust least squares (Huber)."""
+    rows = rows[(rows["beam_m"] > 0) & (np.abs(rows["dbh_m"] - rows["true_m"]) < 0.12)]
+    radius = 0.5 * rows["dbh_m"]
+    terms = np.stack([np.maximum(0, 1 - rows["arc_deg"] / 360) * rows["width_m"], rows["beam_m"],
+                      -rows["beam_m"] * rows["scatter_m"] / np.maximum(radius, THIN_RADIUS)], 1)
+    excess = radius - 0.5 * rows["true_m"]
+    sds = np.sqrt((1.4 * rows["spread_m"]) ** 2 + 0.004 ** 2 + (1.5e-5 * rows["range_m"] ** 2) ** 2)
+    _, cloud, number = np.unique(rows["cloud"], return_inverse=True, return_counts=True)
+    found = np.zeros(3)
+    for _ in range(30):
+        ratio = np.abs(excess - terms @ found) / sds
+        weights = np.sqrt(np.minimum(1, 1.5 / np.maximum(ratio, 1e-9)) / sds ** 2 / np.sqrt(number[cloud]))
+        found = np.linalg.lstsq(terms * weights[:, None], excess * weights, rcond=None)[0]
+    print(f"excess_radius_m: kOneSided {found[0]:.2f}, kAllSides {found[1]:.2f}, kScatter {found[2]:.2f}, from {len(rows)} stems")
+
+
 def tell(kind, rows, fit):
     errors = rows["dbh_m"] - rows["true_m"] - (rows["excess_m"] if kind == "known" else 0)
     terms = terms_of(kind, rows)
@@ -78,6 +97,8 @@ def tell(kind, rows, fit):
 
 def main():
     rows = np.genfromtxt(io.StringIO(sys.stdin.read()), delimiter=",", names=True, dtype=None, encoding="utf-8")
+    if "--fit-radius" in sys.argv:
+        fit_radius(rows)
     for kind in CONSTANTS:
         tell(kind, rows, "--fit" in sys.argv)
 

@@ -70,7 +70,7 @@ void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3
     place.z() = result.ground.terrain.interpolate(place.x(), place.y()) + kBreastHeight;
     const double range = mean_range_to(scanner, place);
     stem.beam = footprint_at(config, range);
-    stem.beam_excess_m = excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg);
+    stem.beam_excess_m = excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg, stem.scatter_m);
     stem.radius_m -= stem.beam_excess_m;
     const double sd = diameter_sd_m(stem.spread_m, stem.arc_deg, range, stem.beam);
     const double foliage_sd_m = stem.in_foliage ? kFoliageRadiusSd : 0.0;

@@ -334,8 +334,8 @@ TEST(Inventory, WideBeamsAreTakenAwayWhereSensorAndPlacesAreKnown) {
   const InventoryResult result = take_inventory(blocks_of(plot.cloud), config, {}, {}, scanner);
   const Tree known = result.trees.at(0);
   EXPECT_EQ(bare.dbh_m, seen.dbh_m);
-  const double excess =
-      excess_radius_m(footprint_at(config.beam, 12.0), 0.5 * bare.dbh_m, result.stems[0].arc_deg);
+  const double excess = excess_radius_m(footprint_at(config.beam, 12.0), 0.5 * bare.dbh_m,
+                                        result.stems[0].arc_deg, result.stems[0].scatter_m);
   EXPECT_GT(excess, 0.003);
   EXPECT_NEAR(known.dbh_m, bare.dbh_m - 2.0 * excess, 0.001);
   EXPECT_LT(known.dbh_sd_m, seen.dbh_sd_m);

@@ -64,7 +64,7 @@ inline constexpr double kClearArcDeg = 60.0;
 inline constexpr double kClearFill = 0.5;
 // Radii: error of its radius at most [chosen: the deviation of its diameter is told]
 inline constexpr double kClearSd = 0.5;
-// Spreads of the refined fit that are its error [chosen: half of beam_footprint::kKnownSpread]
+// Spreads of the refined fit that are its error [chosen]
 inline constexpr double kClearSpreads = 1.4;
 // Radii: its scatter at most [chosen]
 inline constexpr double kClearScatterShare = 0.25;
@@ -334,19 +334,26 @@ inline constexpr double kLeastCosine = 0.08;
 // the echo from behind is stronger [tuned with kOneSided: 0.1, 0.15 and 0.2 were tried]
 inline constexpr double kLeastPart = 0.1;
 // Of the excess of the width, that of the radius of a stem seen from one side; twice as much as at
-// half a circumference [tuned on random seeds 1 to 5, 8 to 10, 12 to 16, 18; true poses]
-inline constexpr double kOneSided = 1.4;
+// half a circumference [tuned on maps of `random` 1 to 6, 8, 13, 16, 49 to 51 and 55 to 60 by the
+// program's own path, with the next two: docs/method/forest-experiments.md]
+inline constexpr double kOneSided = 1.15;
+// Standard deviations of a beam that the radius grows by from whichever side it was seen
+inline constexpr double kAllSides = 0.40;
+// The same, times the scatter over the radius, by which the fit makes it too small
+inline constexpr double kScatter = 1.86;
+// m: of thinner stems it does so as of one of this radius [chosen with them]
+inline constexpr double kThinRadius = 0.03;
 // Radii: a correction is no larger [chosen]
 inline constexpr double kMostShare = 0.4;
 // Standard deviation of a diameter. Of a stem whose beams are compensated: times the spread of the
 // fit ... [tuned: benchmarks/stem_sizes.py]
-inline constexpr double kKnownSpread = 2.8;
+inline constexpr double kKnownSpread = 2.3;
 // ... m at least ... [tuned likewise]
-inline constexpr double kKnownLeastSd = 0.0039;
+inline constexpr double kKnownLeastSd = 0.0057;
 // ... m at 10 m, growing with the square of the range ... [tuned likewise]
-inline constexpr double kKnownRangeSd = 0.0021;
+inline constexpr double kKnownRangeSd = 0.0023;
 // ... and m where a whole beam on bark is as strong as the weakest echo [tuned likewise]
-inline constexpr double kKnownWeakSd = 0.056;
+inline constexpr double kKnownWeakSd = 0.0074;
 // Of one whose beams are not known: times the spread ... [tuned likewise]
 inline constexpr double kWideSpread = 2.6;
 // ... m at least ... [tuned likewise]

@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
+#include "understory/map/clouds/map_tiles.h"
 #include "understory/map/keyframes/keyframe_clouds.h"
 #include "understory/map/keyframes/keyframe_map.h"
 #include "understory/map/keyframes/keyframe_points.h"
 #include "understory/map/local_map.h"
-#include "understory/map/clouds/map_tiles.h"
 #include "understory/util/error.h"
 #include "understory/util/files/folder_test_support.h"
 #include "understory/util/random.h"

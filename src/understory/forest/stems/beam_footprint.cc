@@ -133,9 +133,12 @@ double diameter_sd_m(double spread_m, double arc_deg, double range_m, const Beam
                     kWideOneSided * one_sided * tens);
 }
 
-double excess_radius_m(const BeamFootprint& beam, double radius_m, double arc_deg) {
+double excess_radius_m(const BeamFootprint& beam, double radius_m, double arc_deg,
+                       double scatter_m) {
+  if (!(beam.sd_m > 0.0) || !(radius_m > 0.0)) return 0.0;
   const double one_sided = kOneSided * std::max(0.0, 1.0 - arc_deg / 360.0);
-  const double excess = one_sided * excess_width_m(beam, radius_m);
+  const double all_sides = kAllSides - kScatter * scatter_m / std::max(radius_m, kThinRadius);
+  const double excess = one_sided * excess_width_m(beam, radius_m) + all_sides * beam.sd_m;
   return std::clamp(excess, -kMostShare * radius_m, kMostShare * radius_m);
 }
 

@@ -77,13 +77,25 @@ TEST(BeamFootprint, ExcessOfTheWidthIsThatOfDrawnBeams) {
   EXPECT_EQ(excess_width_m({}, 0.12), 0.0);
 }
 
-TEST(BeamFootprint, AStemThatWasSeenAllAroundKeepsItsRadius) {
+TEST(BeamFootprint, AStemSeenFromOneSideIsTooThick) {
   const BeamFootprint beam{0.012, 100.0};
-  EXPECT_EQ(excess_radius_m(beam, 0.12, 360.0), 0.0);
-  EXPECT_NEAR(excess_radius_m(beam, 0.12, 180.0), 0.7 * excess_width_m(beam, 0.12), 1e-9);
-  EXPECT_EQ(excess_radius_m({}, 0.12, 90.0), 0.0);
+  const double all_round = excess_radius_m(beam, 0.12, 360.0, 0.0);
+  EXPECT_GT(all_round, 0.002);
+  EXPECT_LT(all_round, 0.005);
+  EXPECT_NEAR(excess_radius_m(beam, 0.12, 180.0, 0.0) - all_round,
+              0.575 * excess_width_m(beam, 0.12), 1e-9);
+  EXPECT_EQ(excess_radius_m({}, 0.12, 90.0, 0.02), 0.0);
   // No correction takes a thin stem away.
-  EXPECT_LE(excess_radius_m({0.05, 1000.0}, 0.03, 90.0), 0.4 * 0.03);
+  EXPECT_LE(excess_radius_m({0.05, 1000.0}, 0.03, 90.0, 0.0), 0.4 * 0.03);
+}
+
+// The fit takes away more than the beams add.
+TEST(BeamFootprint, NoiseMakesThinStemsTooThin) {
+  const BeamFootprint beam{0.008, 100.0};
+  const double quiet = excess_radius_m(beam, 0.1, 300.0, 0.006);
+  const double noisy = excess_radius_m(beam, 0.1, 300.0, 0.02);
+  EXPECT_NEAR(quiet - noisy, 1.86 * 0.008 * (0.02 - 0.006) / 0.1, 1e-9);
+  EXPECT_LT(excess_radius_m(beam, 0.05, 300.0, 0.02), noisy);
 }
 
 TEST(BeamFootprint, DiametersAreSurerNearByAndWithKnownBeams) {

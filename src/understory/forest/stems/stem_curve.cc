@@ -315,7 +315,7 @@ std::vector<FittedSection> sections_of(const std::vector<SlicePoint>& points, co
   tracker.follow(kStep, top_m - kStep, above);
   for (std::vector<FittedSection>* part : {&rings, &above}) {
     for (FittedSection& ring : *part)
-      ring.radius_m -= excess_radius_m(stem.beam, ring.radius_m, ring.seen_deg);
+      ring.radius_m -= excess_radius_m(stem.beam, ring.radius_m, ring.seen_deg, stem.scatter_m);
   }
   rings.push_back({kBreastHeight, stem.centre, stem.radius_m,
                    std::sqrt(std::max(0.0, stem.covariance(2, 2))) + kMapError});

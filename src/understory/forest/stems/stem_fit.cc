@@ -299,6 +299,7 @@ void take_over(const NoisyCylinder& fit, const std::vector<SlicePoint>& points,
   result.evidence.scatter_m = std::clamp(fit.scatter_m, kLeastScatter, kMostScatter);
   judge(points, config, result);
   result.evidence.scatter_m = fit.scatter_m;
+  stem.scatter_m = fit.scatter_m;
   set_uncertainty(fit, stem);
 }
 

@@ -17,8 +17,7 @@ ScanClouds::ScanClouds(const ScanCloudsConfig& config, const std::filesystem::pa
     : config_(config), times_(times), clouds_(path) {}
 
 ScanClouds::ScanClouds(const ScanCloudsConfig& config, const std::filesystem::path& path,
-                       const RecordCount& known, const std::optional<Last>& last,
-                       StageTimes& times)
+                       const RecordCount& known, const std::optional<Last>& last, StageTimes& times)
     : config_(config), times_(times), clouds_(path, known), last_(last) {}
 
 bool ScanClouds::offer(const BodyCloud& cloud, const Pose& world_from_body, std::size_t keyframe,

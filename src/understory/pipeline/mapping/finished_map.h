@@ -8,9 +8,9 @@
 
 #include "understory/geometry/stamped_pose.h"
 #include "understory/map/carrier_region.h"
+#include "understory/map/clouds/map_tiles.h"
 #include "understory/map/keyframes/keyframe_clouds.h"
 #include "understory/map/keyframes/keyframe_map.h"
-#include "understory/map/clouds/map_tiles.h"
 #include "understory/util/progress.h"
 
 namespace understory {

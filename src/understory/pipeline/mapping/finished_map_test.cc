@@ -73,7 +73,9 @@ TEST(FinishedMap, FarPointsEnterWhereNothingIsSeenFromNear) {
   for (int i = 0; i < 40; ++i)
     near_stem.points.push_back({5.1F, 0.1F, 0.05F * static_cast<float>(i), 5, 0});
   whole.append(near_stem);
-  far.append({0, 0, {{25.1F, 0.1F, 1.0F, 6, 0}, {15.1F, 0.1F, 1.0F, 7, 0}},
+  far.append({0,
+              0,
+              {{25.1F, 0.1F, 1.0F, 6, 0}, {15.1F, 0.1F, 1.0F, 7, 0}},
               Pose(Eigen::Quaterniond::Identity(), {-10.0, 0.0, 0.0})});
   const std::vector<Keyframe> keyframes(1);
   LeftOutCarrier none;

@@ -50,9 +50,9 @@ class DenseMap : public MapMaker {
     const ScopedTimer timer(front_end_.times(), "finish_gather_map");
     const MapClouds map_clouds{front_end_.clouds(), front_end_.far_clouds(),
                                front_end_.config().far_m};
-    made_.tiles = make_finished_map(map_clouds, front_end_.map().keyframes(),
-                                    front_end_.config().map, recording_.work / "tiles",
-                                    made_.carrier, recording_.progress);
+    made_.tiles =
+        make_finished_map(map_clouds, front_end_.map().keyframes(), front_end_.config().map,
+                          recording_.work / "tiles", made_.carrier, recording_.progress);
   }
 
   void list_trees() override {

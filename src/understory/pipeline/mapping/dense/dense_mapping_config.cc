@@ -36,9 +36,10 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
     table.add("cloud_distance_m", config.cloud_distance_m, {0.0, 100.0}, "m",
               "distance between scans whose clouds make the finished map; turns count as for "
               "keyframes; of sparse scans 0.1");
-    table.add("far_cloud_distance_m", config.far_cloud_distance_m, {0.0, 100.0}, "m",
-              "the same between scans of which only far points are kept, where no other cloud shows "
-              "their place from near; 0: none; with inventory.extent=full 0.25");
+    table.add(
+        "far_cloud_distance_m", config.far_cloud_distance_m, {0.0, 100.0}, "m",
+        "the same between scans of which only far points are kept, where no other cloud shows "
+        "their place from near; 0: none; with inventory.extent=full 0.25");
     table.add("far_m", config.far_m, {1.0, 1000.0}, "m", "from so far on a point is far");
     table.add("thin_m", config.map.thin_m, {0.0, 1.0}, "m",
               "one point per cube of this edge of the finished map; 0: all");
