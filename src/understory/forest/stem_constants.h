@@ -338,8 +338,10 @@ inline constexpr double kLeastPart = 0.1;
 // program's own path, with the next two: docs/method/forest-experiments.md]
 inline constexpr double kOneSided = 1.15;
 // Standard deviations of a beam that the radius grows by from whichever side it was seen
+// [tuned likewise]
 inline constexpr double kAllSides = 0.40;
-// The same, times the scatter over the radius, by which the fit makes it too small
+// The same, times the scatter over the radius, by which the fit makes it too small [tuned
+// likewise]
 inline constexpr double kScatter = 1.86;
 // m: of thinner stems it does so as of one of this radius [chosen with them]
 inline constexpr double kThinRadius = 0.03;

@@ -58,8 +58,8 @@ struct BeamFootprint {
 [[nodiscard]] double diameter_sd_m(double spread_m, double arc_deg, double range_m,
                                    const BeamFootprint& beam);
 
-// By how much a fit of `arc_deg` of the circumference makes a radius too large for that, metres;
-// negative where it makes it too small; 0 where the beams are not known. The whole excess counts
+// By how much a fit of `arc_deg` of the circumference makes a radius too large for that, metres.
+// Negative where it makes it too small, 0 where the beams are not known. The whole excess counts
 // where a stem was seen from one side, and a part of the beam where it was seen all around. Of that
 // the fit itself removes the more, the larger `scatter_m` is beside the radius: that of the points
 // about the surface (NoisyCylinder::scatter_m).

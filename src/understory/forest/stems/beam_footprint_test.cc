@@ -105,8 +105,8 @@ TEST(BeamFootprint, DiametersAreSurerNearByAndWithKnownBeams) {
   // Of a surface of 10 % half of the echoes return from 45 m, and bark has five times as much.
   const double weakness = 5.0 * 5.0 / (5.0 * 45.0 * 45.0);
   EXPECT_NEAR(near,
-              std::sqrt(std::pow(2.8 * 0.002, 2) + std::pow(0.0039, 2) +
-                        std::pow(0.0021 * 0.25, 2) + std::pow(0.056 * weakness, 2)),
+              std::sqrt(std::pow(2.3 * 0.002, 2) + std::pow(0.0057, 2) +
+                        std::pow(0.0023 * 0.25, 2) + std::pow(0.0074 * weakness, 2)),
               1e-9);
   EXPECT_LT(near, far);
   EXPECT_LT(far, diameter_sd_m(0.001, 180.0, 20.0, {}));
@@ -119,7 +119,7 @@ TEST(BeamFootprint, DiametersAreLessSureWhereEchoesAreWeak) {
   const BeamFootprint weak{0.015, 3.0};
   EXPECT_NEAR(std::pow(diameter_sd_m(0.001, 180.0, 15.0, weak), 2) -
                   std::pow(diameter_sd_m(0.001, 180.0, 15.0, strong), 2),
-              std::pow(0.056 / 3.0, 2) - std::pow(0.056 / 50.0, 2), 1e-9);
+              std::pow(0.0074 / 3.0, 2) - std::pow(0.0074 / 50.0, 2), 1e-9);
 }
 
 }  // namespace

@@ -8,6 +8,31 @@
 
 namespace understory {
 
+namespace {
+
+void describe_map(ConfigTable& table, DenseMappingConfig& config) {
+  table.add("enabled", config.map_enabled, "write map.laz and what is made from it");
+  table.add("copc", config.copc,
+            "write map.copc.laz as well: the points of map.laz in an octree, for viewers");
+  table.add("range_max_m", config.map_range_max_m, {1.0, 1000.0}, "m",
+            "farther returns do not enter the finished map");
+  table.add("keyframe_thin_m", config.keyframe_thin_m, {0.0, 1.0}, "m",
+            "one point per cube of this edge of each scan in it; 0: all");
+  table.add("cloud_distance_m", config.cloud_distance_m, {0.0, 100.0}, "m",
+            "distance between scans whose clouds make the finished map; turns count as for "
+            "keyframes; of sparse scans 0.1");
+  table.add("far_cloud_distance_m", config.far_cloud_distance_m, {0.0, 100.0}, "m",
+            "the same between scans of which only far points are kept, where no other cloud shows "
+            "their place from near; 0: none; with inventory.extent=full 0.25");
+  table.add("far_m", config.far_m, {1.0, 1000.0}, "m", "from so far on a point is far");
+  table.add("thin_m", config.map.thin_m, {0.0, 1.0}, "m",
+            "one point per cube of this edge of the finished map; 0: all");
+  table.add("tile_m", config.map.tile_m, {1.0, 1000.0}, "m", "tiles in which it is finished");
+  table.section("carrier", [&] { describe(table, config.carrier); });
+}
+
+}  // namespace
+
 ConfigTable dense_mapping_table(DenseMappingConfig& config) {
   ConfigTable table;
   table.add("imu_rate", config.imu_rate,
@@ -25,27 +50,7 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
     describe(table, config.keyframe_map.local_map.matcher);
   });
   KeyframeMap::describe(table, config.keyframe_map);
-  table.section("map", [&] {
-    table.add("enabled", config.map_enabled, "write map.laz and what is made from it");
-    table.add("copc", config.copc,
-              "write map.copc.laz as well: the points of map.laz in an octree, for viewers");
-    table.add("range_max_m", config.map_range_max_m, {1.0, 1000.0}, "m",
-              "farther returns do not enter the finished map");
-    table.add("keyframe_thin_m", config.keyframe_thin_m, {0.0, 1.0}, "m",
-              "one point per cube of this edge of each scan in it; 0: all");
-    table.add("cloud_distance_m", config.cloud_distance_m, {0.0, 100.0}, "m",
-              "distance between scans whose clouds make the finished map; turns count as for "
-              "keyframes; of sparse scans 0.1");
-    table.add(
-        "far_cloud_distance_m", config.far_cloud_distance_m, {0.0, 100.0}, "m",
-        "the same between scans of which only far points are kept, where no other cloud shows "
-        "their place from near; 0: none; with inventory.extent=full 0.25");
-    table.add("far_m", config.far_m, {1.0, 1000.0}, "m", "from so far on a point is far");
-    table.add("thin_m", config.map.thin_m, {0.0, 1.0}, "m",
-              "one point per cube of this edge of the finished map; 0: all");
-    table.add("tile_m", config.map.tile_m, {1.0, 1000.0}, "m", "tiles in which it is finished");
-    table.section("carrier", [&] { describe(table, config.carrier); });
-  });
+  table.section("map", [&] { describe_map(table, config); });
   table.section("inventory", [&] { describe(table, config.inventory); });
   table.section("obstacles", [&] { describe(table, config.obstacles); });
   table.section("georeference", [&] { describe(table, config.georeference); });
