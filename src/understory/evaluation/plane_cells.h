@@ -41,7 +41,7 @@ class PlaneCells {
     double row;
     double column;
     std::size_t index;
-    auto operator<=>(const Place&) const = default;
+    auto operator<=>(const Place&) const = default;  // NOLINT(modernize-use-nullptr)
   };
   [[nodiscard]] double cell(double coordinate) const { return std::floor(coordinate / cell_m_); }
 

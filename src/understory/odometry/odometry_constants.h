@@ -100,7 +100,7 @@ inline constexpr double kCertainSigmaM = 1.0;
 // scans that it waits for: the first one sees part of a turn [chosen]
 inline constexpr std::uint32_t kWaitedScans = 5;
 // m/s: no carrier is faster [bound: carriers]
-inline constexpr double kHighestSpeedM_S = 100.0;
+inline constexpr double kHighestSpeedMPerS = 100.0;
 }  // namespace recovery
 
 namespace scan_path {  // odometry/dense/scan_path.cc

@@ -59,10 +59,10 @@ inline constexpr double kRangeM = 10.0;
 inline constexpr double kShareOfScatterWhenCleared = 0.5;
 // Share of the scans whose points have times in no order [chosen: no lidar gives one]
 inline constexpr double kMostMixedTimes = 0.05;
-// degrees that a map leans at most, with kLargeBiasM_s2: 1.7 m over 50 m [chosen]
+// degrees that a map leans at most, with kLargeBiasMPerS2: 1.7 m over 50 m [chosen]
 inline constexpr double kMostTiltDeg = 2.0;
 // m/s^2: an accelerometer that is off by more is not calibrated; good ones have 0.1 [data sheets]
-inline constexpr double kLargeBiasM_s2 = 0.3;
+inline constexpr double kLargeBiasMPerS2 = 0.3;
 }  // namespace run_judgement
 
 namespace stand_notes {  // pipeline/judgement/stand_notes.cc

@@ -40,7 +40,7 @@ class PointSample {
     std::int8_t x = 0;
     std::int8_t y = 0;
     std::uint16_t z = 0;
-    auto operator<=>(const Point&) const = default;
+    auto operator<=>(const Point&) const = default;  // NOLINT(modernize-use-nullptr)
   };
   explicit PointSample(std::size_t most) : most_(most) {}
   void add(const Point& point) {

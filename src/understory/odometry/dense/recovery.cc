@@ -29,7 +29,7 @@ bool Recovery::lost_over_outage(TimeNs stamp, const DenseEstimate& estimate) con
 bool Recovery::lost(const DenseEstimate& estimate, std::uint64_t unmatched_in_a_row) const {
   const bool finite = estimate.state.world_from_body.matrix().allFinite() &&
                       estimate.state.velocity_in_world.allFinite() &&
-                      estimate.state.velocity_in_world.norm() < kHighestSpeedM_S;
+                      estimate.state.velocity_in_world.norm() < kHighestSpeedMPerS;
   const bool matched = estimate.matched && estimate.update.status == MotionStatus::kAccepted;
   return !finite ||
          (!matched && unmatched_in_a_row + 1 >= static_cast<std::uint64_t>(lost_after_scans_));

@@ -375,7 +375,7 @@ class Judge {
 
   void judge_imu() {
     if (evidence_.imu_used && evidence_.tilt_at_end_deg > kMostTiltDeg &&
-        evidence_.accelerometer_bias_m_s2 > kLargeBiasM_s2) {
+        evidence_.accelerometer_bias_m_s2 > kLargeBiasMPerS2) {
       hurt(fmt::format(
           "the map leans by {:.1f} degrees: the accelerometer is off by {:.2f} m/s^2, which showed "
           "only after the map was levelled by it. Calibrate the IMU",
