@@ -1,9 +1,11 @@
 // Diameters of the stems of simulated clouds beside their truth. The clouds are searched once, and
 // their stems kept, so that a change of the fit is measured on thousands of stems within seconds.
-//   stem_sizes gather SENSOR TRUTH FILE   stems of TRUTH/points.laz and the points around them
-//   stem_sizes fit FILE [FILE ...]        fits them; prints a table (CSV) with a row for each stem
+//   stem_sizes gather SENSOR TRUTH FILE       stems of TRUTH/points.laz and the points around them
+//   stem_sizes gather SENSOR TRUTH FILE RUN   the same of RUN/map.laz, by the run's own path
+//   stem_sizes fit FILE [FILE ...]            fits them; prints a table (CSV), a row for each stem
 // TRUTH is the folder of `understory simulate --set truth.points=true`, SENSOR a name of the
-// setting beam.sensor ("unknown": no footprints). Stems within 30 m of the true path are taken that
+// setting beam.sensor ("unknown": no footprints). RUN is of `understory map` with
+// georeference.enabled=false; the true trees are laid on its list. Stems within 30 m of the true path are taken that
 // stand within 0.5 m of a true tree. benchmarks/stem_sizes.py fits the constants of diameter_sd_m
 // and of excess_radius_m.
 #include <algorithm>
@@ -26,6 +28,7 @@
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/stems/stem_fit.h"
 #include "understory/recording/clouds/cloud_file.h"
+#include "understory/util/error.h"
 #include "understory/util/log.h"
 
 namespace understory {
@@ -100,13 +103,33 @@ Kept describe_stem(const StemFit& stem, const Eigen::Vector3d& breast,
   return kept;
 }
 
-void gather(LidarSensor sensor, const std::string& truth, const std::string& out) {
-  Log log;
-  const PointCloudFile cloud = read_cloud(truth + "/points.laz", log);
-  const std::vector<Tree> trees = read_trees(truth + "/trees.csv");
+// A cloud, its scanner's path and the true trees, all in one frame.
+struct KnownCloud {
+  PointCloudFile cloud;
+  std::vector<Tree> trees;
   std::vector<Eigen::Vector3d> scanner;
-  for (const auto& pose : read_trajectory(truth + "/trajectory.tum"))
-    scanner.push_back(pose.world_from_body.translation());
+};
+
+// `run`: empty for the cloud of the truth.
+KnownCloud read_known_cloud(const std::string& truth, const std::string& run) {
+  Log log;
+  KnownCloud known;
+  known.cloud = read_cloud(run.empty() ? truth + "/points.laz" : run + "/map.laz", log);
+  known.trees = read_trees(truth + "/trees.csv");
+  if (!run.empty()) {
+    const auto run_from_truth =
+        align_trees(known.trees, read_trees(run + "/trees.csv"), Alignment::kYaw, kSameM);
+    if (!run_from_truth) throw InputError(run, "", "expected trees that match those of the truth");
+    known.trees = moved(known.trees, *run_from_truth);
+  }
+  for (const auto& pose : read_trajectory((run.empty() ? truth : run) + "/trajectory.tum"))
+    known.scanner.push_back(pose.world_from_body.translation());
+  return known;
+}
+
+void gather(LidarSensor sensor, const std::string& truth, const std::string& out,
+            const std::string& run) {
+  const auto [cloud, trees, scanner] = read_known_cloud(truth, run);
   const GroundModel ground = estimate_ground(blocks_of_cloud(cloud), {});
   const StemDetectorConfig config;
   std::vector<SlicePoint> points = slices_of(cloud, ground, config);
@@ -165,8 +188,8 @@ void fit(const std::string& path) {
 int main(int argc, char** argv) {
   using namespace understory;
   const std::string mode = argc > 2 ? argv[1] : "";
-  if (mode == "gather" && argc == 5 && kSensors.count(argv[2]) > 0) {
-    gather(kSensors.at(argv[2]), argv[3], argv[4]);
+  if (mode == "gather" && (argc == 5 || argc == 6) && kSensors.count(argv[2]) > 0) {
+    gather(kSensors.at(argv[2]), argv[3], argv[4], argc == 6 ? argv[5] : "");
   } else if (mode == "fit") {
     std::printf(
         "cloud,sensor,path_m,range_m,true_m,dbh_m,excess_m,spread_m,arc_deg,returns,scatter_m,"
@@ -174,7 +197,7 @@ int main(int argc, char** argv) {
     for (int i = 2; i < argc; ++i)
       fit(argv[i]);
   } else {
-    std::fprintf(stderr, "stem_sizes gather SENSOR TRUTH FILE | stem_sizes fit FILE ...\n");
+    std::fprintf(stderr, "stem_sizes gather SENSOR TRUTH FILE [RUN] | stem_sizes fit FILE ...\n");
     return 2;
   }
   return 0;

@@ -1,6 +1,6 @@
 """A run killed at work and resumed on another number of threads gives the bytes of an undisturbed one.
-Runs are of a harvester's scans with an IMU, of sparse scans without one, and by stems alone with
-either."""
+Runs are of a harvester's scans with an IMU, of sparse scans without one, of a full inventory, and by
+stems alone with either."""
 
 import pathlib
 import signal
@@ -22,6 +22,9 @@ CASES = {
     # What is adapted to sparse scans and what the user set of it are the same after the kill.
     "sparse_scans": (("lieksa2", 21, 60), "journal.bin", 60_000,
                      ["--set", "keyframe.distance_m=0.4"], DENSE),
+    # Far points of the scans between are kept, too.
+    "full_inventory": (("handheld", 21, 10), "far_clouds.bin", 3_000_000, ["--inventory", "full"],
+                       [*DENSE, "stem_curves.csv"]),
     "stems": (("lieksa2", 21, 60), "views.bin", 100_000,
               ["--front-end", "sparse", "--set", "run.checkpoint_interval_s=2"], STEMS),
     "stems_imu": (("harvester", 21, 24), "views.bin", 80_000,

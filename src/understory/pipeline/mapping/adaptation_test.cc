@@ -60,6 +60,15 @@ TEST(Adaptation, ADenseLidarWithAnImuRunsAsAsked) {
   EXPECT_EQ(yaml_of(adapted.config), yaml_of(DenseMappingConfig()));
 }
 
+TEST(Adaptation, AFullInventoryKeepsFarPointsOfMoreScans) {
+  const auto adapted = adapt_read("", {"inventory.extent=full"}, many_rings());
+  EXPECT_EQ(keys_of(adapted.changes), std::vector<std::string>{"map.far_cloud_distance_m"});
+  EXPECT_EQ(adapted.config.far_cloud_distance_m, 0.25);
+  const auto asked =
+      adapt_read("", {"inventory.extent=full", "map.far_cloud_distance_m=0"}, many_rings());
+  EXPECT_EQ(asked.config.far_cloud_distance_m, 0.0);
+}
+
 TEST(Adaptation, SparseScansAreThinnedLessAndEachChangeIsTold) {
   const auto adapted = adapt_read("", {}, sixteen_rings());
   EXPECT_EQ(adapted.config.odometry.voxel.voxel_size_m, 0.1);

@@ -7,7 +7,6 @@
 #include "understory/util/error.h"
 
 namespace understory {
-
 namespace {
 
 void describe_map(ConfigTable& table, DenseMappingConfig& config) {
