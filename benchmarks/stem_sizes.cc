@@ -5,9 +5,9 @@
 //   stem_sizes fit FILE [FILE ...]            fits them; prints a table (CSV), a row for each stem
 // TRUTH is the folder of `understory simulate --set truth.points=true`, SENSOR a name of the
 // setting beam.sensor ("unknown": no footprints). RUN is of `understory map` with
-// georeference.enabled=false; the true trees are laid on its list. Stems within 30 m of the true path are taken that
-// stand within 0.5 m of a true tree. benchmarks/stem_sizes.py fits the constants of diameter_sd_m
-// and of excess_radius_m.
+// georeference.enabled=false; the true trees are laid on its list. Stems within 30 m of the true
+// path are taken that stand within 0.5 m of a true tree. benchmarks/stem_sizes.py fits the
+// constants of diameter_sd_m and of excess_radius_m.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>

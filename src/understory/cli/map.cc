@@ -191,10 +191,11 @@ void add_map_command(CLI::App& app, Command& chosen) {
                       "has GNSS: EPSG:3067 or WKT (if not given ETRS-TM35FIN in Finland, else the "
                       "UTM zone)");
   command
-      ->add_option("--inventory", options->inventory,
-                   "What is measured of the trees. basic (if not given): diameters and heights. "
-                   "full: also stem curves, volumes, crowns, the tree of each point, and trees "
-                   "of 2 to 5 cm")
+      ->add_option(
+          "--inventory", options->inventory,
+          "What is measured of the trees. basic (if not given): diameters and heights. "
+          "full: also stem curves, volumes, crowns, the tree of each point, more trees far "
+          "from the path, and trees of 2 to 5 cm")
       ->check(CLI::IsMember({"basic", "full"}));
   add_plot_options(*command, options->plots);
   command->add_flag("--copc", options->copc,
