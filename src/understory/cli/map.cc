@@ -194,8 +194,7 @@ void add_map_command(CLI::App& app, Command& chosen) {
       ->add_option(
           "--inventory", options->inventory,
           "What is measured of the trees. basic (if not given): diameters and heights. "
-          "full: also stem curves, volumes, crowns, the tree of each point, more trees far "
-          "from the path, and trees of 2 to 5 cm")
+          "full: also stem curves, volumes, crowns, the tree of each point, thin and far trees")
       ->check(CLI::IsMember({"basic", "full"}));
   add_plot_options(*command, options->plots);
   command->add_flag("--copc", options->copc,
