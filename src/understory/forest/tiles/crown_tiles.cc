@@ -99,12 +99,14 @@ class TileAbove {
                          add(points[i] - task_.origin, heights[i]);
                      }
                    });
-    for (std::size_t i = 0; i < around_.stems.size(); ++i)
+    for (std::size_t i = 0; i < around_.stems.size(); ++i) {
       tops_.push_back(columns_.top(i, task_.slices_end_m, task_.low_tops));
+      reached_.push_back(columns_.top_with_neighbours(i, task_.slices_end_m, task_.low_tops));
+    }
     // Near a scanner the ground has a hundred times the points of a crown, and the ceiling may lie
-    // under the crown. A point below the top of its tree is real.
+    // under the crown. A point below the top of its tree, or of what reaches over it, is real.
     for (const HeldBack& point : held_back_) {
-      if (static_cast<double>(point.over_foot_m) <= tops_[point.tree])
+      if (static_cast<double>(point.over_foot_m) <= reached_[point.tree])
         canopy_.add(point.place.cast<double>(), static_cast<double>(point.height_m));
     }
   }
@@ -121,8 +123,9 @@ class TileAbove {
       if (!std::isfinite(height)) continue;
       result.top_points[stem] = columns_.points_below(i, height, kHalfMetre);
       result.top_metre_points[stem] = columns_.points_below(i, height, 2 * kHalfMetre);
-      result.beyond_points[stem] = columns_.points_above(i, height, kBeyond);
-      result.sky_points[stem] = columns_.points_above(i, height + kSkyFrom, kSky);
+      const bool overtopped = tops_[i] < reached_[i];
+      result.beyond_points[stem] = columns_.points_above(i, height, kBeyond, overtopped);
+      result.sky_points[stem] = columns_.points_above(i, height + kSkyFrom, kSky, overtopped);
     }
     if (!task_.full) return;
     std::vector<std::vector<SlicePoint>> points = surroundings_->take();
@@ -180,7 +183,8 @@ class TileAbove {
   OccupiedSpace space_;
   TreeOwners owners_;
   std::vector<HeldBack> held_back_;
-  std::vector<double> tops_;  // of around_
+  std::vector<double> tops_;     // of around_
+  std::vector<double> reached_;  // the same, with the crowns of neighbours above them
 };
 
 }  // namespace

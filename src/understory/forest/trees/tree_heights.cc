@@ -27,6 +27,10 @@ int decimetre_of(double height_m) {
   return static_cast<int>(std::min(10.0 * HeightColumn::kMetres - 1.0, 10.0 * height_m));
 }
 
+void count_one(std::uint8_t& count) {
+  if (count < std::numeric_limits<std::uint8_t>::max()) ++count;
+}
+
 }  // namespace
 
 Eigen::Vector2d stem_place_at(const StemFit& stem, double height_m) {
@@ -66,12 +70,48 @@ std::size_t TreeColumns::add(const Eigen::Vector3d& point, double height_m) {
   const std::size_t metre = HeightColumn::metre_of(over_foot);
   ++column.points[metre];
   column.highest_m[metre] = std::max(column.highest_m[metre], static_cast<float>(over_foot));
-  std::uint8_t& count = column.decimetres[static_cast<std::size_t>(decimetre_of(over_foot))];
-  if (count < 255) ++count;
+  const auto decimetre = static_cast<std::size_t>(decimetre_of(over_foot));
+  count_one(column.decimetres[decimetre]);
+  if (least < kCoreRadius * kCoreRadius) count_one(column.core[decimetre]);
   return nearest;
 }
 
 double TreeColumns::top(std::size_t stem, double slices_end_m, bool low_tops) const {
+  const double all = top_with_neighbours(stem, slices_end_m, low_tops);
+  if (!(all > slices_end_m)) return all;
+  const double own = core_end(stem, slices_end_m);
+  if (all - own <= kLeastOver || own <= kLeastSlenderness * 2.0 * stems_[stem].radius_m) return all;
+  const Column& column = columns_[stem];
+  const int begin = decimetre_of(own), end = decimetre_of(all) + 1;
+  const double points = points_within(column.decimetres, begin, end);
+  const double at_axis = points_within(column.core, begin, end);
+  const bool overtopped = at_axis < kOwnCrownShare * points && has_thicker_neighbour(stem);
+  return overtopped ? own : all;
+}
+
+double TreeColumns::core_end(std::size_t stem, double slices_end_m) const {
+  const Counts& core = columns_[stem].core;
+  const auto count = static_cast<int>(core.size());
+  int last = decimetre_of(slices_end_m);
+  for (int d = last; d < count; ++d) {
+    if (core[static_cast<std::size_t>(d)] > 0) last = d;
+    // What so many empty decimetres would hold, did the tree go on as below.
+    const int expected = (d - last) * points_within(core, last + 1 - kBelowCore, last + 1);
+    if (d - last > kCoreGap && expected >= kBelowCore * kCoreExpected) break;
+  }
+  return 0.1 * (last + 1);
+}
+
+bool TreeColumns::has_thicker_neighbour(std::size_t stem) const {
+  const StemFit& own = stems_[stem];
+  return std::any_of(stems_.begin(), stems_.end(), [&](const StemFit& other) {
+    return kThicker * other.radius_m > own.radius_m &&
+           (other.centre - own.centre).squaredNorm() < kOvertopReach * kOvertopReach;
+  });
+}
+
+double TreeColumns::top_with_neighbours(std::size_t stem, double slices_end_m,
+                                        bool low_tops) const {
   const double high = high_top(stem, slices_end_m);
   const bool thin = stems_[stem].in_foliage || stems_[stem].radius_m <= kLowTreeRadius;
   if (!low_tops || !thin) return high;
@@ -108,16 +148,17 @@ double TreeColumns::low_top(std::size_t stem) const {
 
 int TreeColumns::points_below(std::size_t stem, double height_m, int decimetres) const {
   const int end = decimetre_of(height_m) + 1;
-  return points_within(stem, end - decimetres, end);
+  return points_within(columns_[stem].decimetres, end - decimetres, end);
 }
 
-int TreeColumns::points_above(std::size_t stem, double height_m, int decimetres) const {
+int TreeColumns::points_above(std::size_t stem, double height_m, int decimetres,
+                              bool overtopped) const {
   const int begin = decimetre_of(height_m) + 1;
-  return points_within(stem, begin, begin + decimetres);
+  const Column& column = columns_[stem];
+  return points_within(overtopped ? column.core : column.decimetres, begin, begin + decimetres);
 }
 
-int TreeColumns::points_within(std::size_t stem, int begin, int end) const {
-  const auto& counts = columns_[stem].decimetres;
+int TreeColumns::points_within(const Counts& counts, int begin, int end) {
   int points = 0;
   for (int d = std::max(0, begin); d < std::min(end, static_cast<int>(counts.size())); ++d)
     points += counts[static_cast<std::size_t>(d)];

@@ -31,22 +31,35 @@ class TreeColumns {
   // NaN also where the points end as if cut off just above them: that is no tree top. With
   // `low_tops` the cloud is known to show all heights. A thin tree may then end lower, where the
   // points end that hang together with its stem. Their gaps are of half a metre at most.
+  // The crown of a thicker neighbour may reach over the tree. Then its top is where the points
+  // near its own axis end.
   [[nodiscard]] double top(std::size_t stem, double slices_end_m, bool low_tops = false) const;
+  // The same, with what reaches over the tree.
+  [[nodiscard]] double top_with_neighbours(std::size_t stem, double slices_end_m,
+                                           bool low_tops = false) const;
   [[nodiscard]] double ground_m(std::size_t stem) const { return ground_m_[stem]; }
   // Points in so many decimetres below a height; of each decimetre 255 stand for more.
   [[nodiscard]] int points_below(std::size_t stem, double height_m, int decimetres) const;
-  // Points in so many decimetres above the one that holds a height, likewise.
-  [[nodiscard]] int points_above(std::size_t stem, double height_m, int decimetres) const;
+  // Points in so many decimetres above the one that holds a height, likewise. Of a tree that a
+  // neighbour reaches over, only those near its axis count.
+  [[nodiscard]] int points_above(std::size_t stem, double height_m, int decimetres,
+                                 bool overtopped = false) const;
 
  private:
+  // Points of each decimetre above the ground.
+  using Counts = std::array<std::uint8_t, 10 * HeightColumn::kMetres>;
   struct Column : HeightColumn {
-    std::array<float, kMetres> highest_m{};               // within each metre
-    std::array<std::uint8_t, 10 * kMetres> decimetres{};  // points of each
+    std::array<float, kMetres> highest_m{};  // within each metre
+    Counts decimetres{};                     // points of each
+    Counts core{};                           // those near the axis
   };
   [[nodiscard]] double high_top(std::size_t stem, double slices_end_m) const;
   [[nodiscard]] double low_top(std::size_t stem) const;
+  // Height at which the points near the axis end, from the slices up.
+  [[nodiscard]] double core_end(std::size_t stem, double slices_end_m) const;
+  [[nodiscard]] bool has_thicker_neighbour(std::size_t stem) const;
   // Points of the decimetres [begin, end).
-  [[nodiscard]] int points_within(std::size_t stem, int begin, int end) const;
+  [[nodiscard]] static int points_within(const Counts& counts, int begin, int end);
 
   const std::vector<StemFit>& stems_;
   std::vector<double> ground_m_;

@@ -54,6 +54,56 @@ TEST(TreeHeights, ALeaningTreeIsFollowedToItsCrown) {
   EXPECT_NEAR(stem_place_at(stems[0], 30.0).x(), 1.5, 1e-12);
 }
 
+// A thin tree of 8 m below the crown of a neighbour 2 m away, which begins at 7 m and reaches over
+// it. Top of the thin tree.
+double top_below_a_crown(double radius_m, double neighbour_radius_m, double crown_from_axis_m) {
+  std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0), stem_with_slope(2.0, 0.0)};
+  stems[0].radius_m = radius_m;
+  stems[1].radius_m = neighbour_radius_m;
+  TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
+  add_crown(columns, 0.0, 0.0, 1.0, 8.0);
+  add_crown(columns, crown_from_axis_m + 0.3, 0.0, 7.0, 15.0);
+  add_crown(columns, 2.0, 0.0, 1.0, 15.0);
+  return columns.top(0, 3.5);
+}
+
+TEST(TreeHeights, AThinTreeEndsBelowTheCrownOfAThickerNeighbour) {
+  EXPECT_NEAR(top_below_a_crown(0.04, 0.10, 0.45), 8.0, 0.1);
+}
+
+TEST(TreeHeights, ACrownAboveAThickTreeIsItsOwn) {
+  EXPECT_NEAR(top_below_a_crown(0.10, 0.10, 0.45), 15.0, 0.1);
+}
+
+TEST(TreeHeights, PointsAtTheAxisOfATreeAreItsOwn) {
+  EXPECT_NEAR(top_below_a_crown(0.04, 0.10, 0.05), 15.0, 0.1);
+}
+
+TEST(TreeHeights, ATreeBelowANeighbourDoesNotBecomeStout) {
+  // A stem of 17 cm that ends at 8 m has 47 times its diameter: its crown forks.
+  EXPECT_NEAR(top_below_a_crown(0.085, 0.15, 0.45), 15.0, 0.1);
+  EXPECT_NEAR(top_below_a_crown(0.075, 0.15, 0.45), 8.0, 0.1);
+}
+
+TEST(TreeHeights, FewPointsAtTheAxisDoNotEndATree) {
+  std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0), stem_with_slope(2.0, 0.0)};
+  stems[0].radius_m = 0.04;
+  stems[1].radius_m = 0.10;
+  TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
+  for (double height = 1.0; height <= 12.0; height += 0.9)  // as a sparse lidar shows them
+    columns.add({0.1, 0.0, height}, height);
+  add_crown(columns, 0.8, 0.0, 5.0, 12.0);
+  EXPECT_NEAR(columns.top(0, 3.5), 12.0, 0.1);
+}
+
+TEST(TreeHeights, OnlyPointsAtTheAxisTellWhetherATreeBelowANeighbourGoesOn) {
+  std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0), stem_with_slope(2.0, 0.0)};
+  TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
+  add_crown(columns, 0.8, 0.0, 8.0, 15.0);
+  EXPECT_GT(columns.points_above(0, 8.0, 40), 20);
+  EXPECT_EQ(columns.points_above(0, 8.0, 40, true), 0);
+}
+
 TEST(TreeHeights, NoTopIsInvented) {
   const std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0), stem_with_slope(10.0, 0.0),
                                       stem_with_slope(20.0, 0.0)};
