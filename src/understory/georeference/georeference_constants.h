@@ -22,6 +22,17 @@ namespace satellite_pairs {  // georeference/satellites/satellite_pairs.cc
 // Share of the line between two antennas in the plane below which its heading does not count
 // [chosen: 60 degrees; a world that is 0.25 degrees off level turns it by 0.43 there]
 inline constexpr double kUpright = 0.5;
+// Fixes of one interval from which on one is compared with the others [bound: two tell not which]
+inline constexpr std::size_t kFewestToCompare = 3;
+// m from the median of an interval's fixes beyond which one is left out [chosen: errors below trees
+// change slowly, and hardly by 10 m within a second]
+inline constexpr double kFarFixM = 10.0;
+// Medians of those distances beyond which one is left out as well [chosen: normal errors: one in
+// 1e7]
+inline constexpr double kFarFixMedians = 8.0;
+// Degrees of latitude and longitude from the median of all fixes up to which one may tell the
+// origin [chosen: 20 km, more than a day's way on foot]
+inline constexpr double kFarOriginDeg = 0.2;
 }  // namespace satellite_pairs
 
 namespace satellite_belief {  // georeference/satellites/satellite_belief.cc

@@ -235,6 +235,9 @@ inline constexpr double kMostHeadingSdDeg = 5.0;
 // m: a carrier that stands and is placed by headings counts as a path of that extent, where fixes
 // are compared with it [chosen: receivers under trees err by less than 0.4 of it]
 inline constexpr double kStandingReachM = 25.0;
+// Share of the pairs of fixes and path that may be far off the others. Beyond it all pairs tell
+// whether the fixes are of this run [chosen: half is what a robust fit can stand]
+inline constexpr double kMostLeftOut = 0.25;
 // m from the body to an antenna [bound: carriers]
 inline constexpr double kLongestArmM = 10.0;
 // m around the path whose ground is fitted [chosen]

@@ -8,6 +8,7 @@
 #include "understory/geometry/matrix_inverse.h"
 #include "understory/geometry/symmetric_solver.h"
 #include "understory/georeference/georeference_constants.h"
+#include "understory/sensor/fix_position.h"
 
 namespace understory {
 namespace {
@@ -183,12 +184,21 @@ void tell_residuals(const std::vector<SatellitePair>& pairs, const SplitFit& see
                     SatelliteFit& fit) {
   double plane = 0.0;
   double height = 0.0;
-  for (const SatellitePair& pair : pairs) {
+  double all = 0.0;
+  double n = 0.0;
+  // Pairs far off the others hardly count for the fit, and do not tell how good it is.
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const SatellitePair& pair = pairs[i];
     const Vector3d r = pair.fix_in_enu - fit.enu_from_world * pair.antenna_in_world;
+    all += r.head<2>().squaredNorm();
+    if (seen.far_off[i] != 0) continue;
     plane += r.head<2>().squaredNorm();
     height += r.z() * r.z();
+    n += 1.0;
   }
-  const auto n = static_cast<double>(pairs.size());
+  const auto pairs_at_all = static_cast<double>(pairs.size());
+  fit.left_out_share = 1.0 - n / pairs_at_all;
+  fit.all_plane_rms_m = std::sqrt(all / pairs_at_all);
   fit.plane_rms_m = std::sqrt(plane / n);
   fit.height_rms_m = seen.height_known ? std::sqrt(height / n) : std::nan("");
   fit.plane_noise_m = std::hypot(seen.plane_noise.slow_sd_m(), seen.plane_noise.fast_sd_m());
@@ -227,7 +237,8 @@ void tell_fixes(const std::vector<StampedPose>& trajectory, const std::vector<Gn
       if (pair == pairs.pairs.end() ||
           (pair != pairs.pairs.begin() && time_s - std::prev(pair)->time_s < pair->time_s - time_s))
         --pair;
-      one.used = seen.far_off[static_cast<std::size_t>(pair - pairs.pairs.begin())] == 0;
+      one.used = is_on_globe(fix) && !pairs.left_out.contains(fix.stamp) &&
+                 seen.far_off[static_cast<std::size_t>(pair - pairs.pairs.begin())] == 0;
     }
     fit.fixes.push_back(one);
   }
@@ -301,7 +312,7 @@ std::vector<SatelliteFit> fits_to_satellites(const std::vector<StampedPose>& tra
     fit.found = true;
     tell_error(trajectory, fit);
     tell_residuals(pairs.pairs, seen, fit);
-    fit.swapped = fit_swapped(trajectory, fixes, config, fit.plane_rms_m);
+    fit.swapped = fit_swapped(trajectory, fixes, config, fit.all_plane_rms_m);
     tell_fixes(trajectory, fixes, config, pairs, seen, fit);
   }
   return fits;

@@ -53,9 +53,11 @@ struct SatelliteFit {
   Matrix6d spread = Matrix6d::Zero();  // about `middle`, see SplitFit
   double expected_error_m = 0.0;       // root mean square over the poses of the path
   bool height_known = false;
-  // Fix minus antenna at its time over all pairs, root mean square.
+  // Fix minus antenna at its time, root mean square over the pairs that count.
   double plane_rms_m = 0.0;
   double height_rms_m = 0.0;
+  double all_plane_rms_m = 0.0;  // the same over all pairs
+  double left_out_share = 0.0;   // of the pairs: far off the others
   // What the receiver's errors look like: NaN in height where no fix has one.
   double plane_noise_m = 0.0;
   double height_noise_m = 0.0;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <functional>
 
 #include "understory/georeference/satellites/test_mast.h"
 #include "understory/util/random.h"
@@ -390,6 +391,69 @@ TEST(SatelliteFit, HeadingsThatContradictThePositionsAreLeftOut) {
     EXPECT_EQ(yaw_of(fit.enu_from_world), yaw_of(without.enu_from_world));
     EXPECT_EQ(fit.expected_error_m, without.expected_error_m);
   }
+}
+
+// The fixes five times a second, and every fifth from `first` on moved by `change`.
+std::vector<GnssFix> with_false_fixes(const std::vector<StampedPose>& poses, std::size_t first,
+                                      std::size_t step,
+                                      const std::function<void(GnssFix&)>& change) {
+  std::vector<GnssFix> fixes = received(poses, {.slow_m = 0.3, .fast_m = 0.1}, 5);
+  for (std::size_t k = first; k < fixes.size(); k += step)
+    change(fixes[k]);
+  return fixes;
+}
+
+// A regression: fixes of an interval were averaged before anything robust saw them. One in each
+// moved the whole map, and the stated error stayed small.
+TEST(SatelliteFit, OneFalseFixOfEachIntervalDoesNotMoveTheRun) {
+  const std::vector<StampedPose> poses = walk();
+  const auto no_place = [](GnssFix& fix) {
+    fix.latitude_deg = fix.longitude_deg = fix.height_m = 0.0;
+  };
+  const auto north = [](GnssFix& fix) { fix.latitude_deg += 100.0 / 111e3; };
+  const auto low = [](GnssFix& fix) { fix.height_m = 0.0; };
+  for (const std::function<void(GnssFix&)>& change :
+       {std::function<void(GnssFix&)>(no_place), std::function<void(GnssFix&)>(north),
+        std::function<void(GnssFix&)>(low)}) {
+    const std::vector<GnssFix> fixes = with_false_fixes(poses, 2, 5, change);
+    const SatelliteFit fit =
+        fit_to_satellites(poses, fixes, SatelliteMethod::kSplit, usual_fit(), {});
+    ASSERT_TRUE(fit.found) << fit.reason;
+    EXPECT_LT(rms_error_m(fit, poses), 0.6);
+    EXPECT_LT(fit.plane_rms_m, 1.0);
+    for (std::size_t k = 0; k < fixes.size(); ++k)
+      EXPECT_EQ(fit.fixes[k].used, k % 5 != 2) << k;
+  }
+}
+
+// Regressions: the first fix told the frame, and one fix far away made the run "not of these
+// fixes".
+TEST(SatelliteFit, ASingleFalseFixIsLeftOutWhereverItIs) {
+  const std::vector<StampedPose> poses = walk();
+  const std::size_t fixes = poses.size() / 2;
+  for (const std::size_t at : {std::size_t{0}, fixes / 2}) {
+    const SatelliteFit fit = fit_to_satellites(
+        poses, with_false_fixes(poses, at, fixes, [](GnssFix& fix) { fix.latitude_deg -= 10.0; }),
+        SatelliteMethod::kSplit, usual_fit(), {});
+    ASSERT_TRUE(fit.found) << fit.reason;
+    EXPECT_LT((EastNorthUp(kPlace).from_place(*fit.origin)).norm(), 1'000.0);
+    EXPECT_LT(rms_error_m(fit, poses), 0.6);
+    EXPECT_LT(fit.plane_rms_m, 1.0);
+    EXPECT_FALSE(fit.fixes[at].used);
+  }
+}
+
+TEST(SatellitePairs, TheWayOfTheAntennaIsNoError) {
+  GatheredPair pair;
+  for (int k = 0; k < 10; ++k) {
+    SatellitePair one;
+    one.time_s = 0.1 * k;
+    one.antenna_in_world = {5.0 * k, 0.0, 0.0};
+    one.fix_in_enu = {0.0, 5.0 * k, 0.0};
+    one.fixes = 1;
+    pair.add(one);
+  }
+  EXPECT_EQ(pair.mean().fixes, 10U);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "understory/georeference/georeference_constants.h"
+#include "understory/sensor/fix_position.h"
 #include "understory/util/angles.h"
 #include "understory/util/stable_sort.h"
 
@@ -20,8 +21,39 @@ using namespace georeference_constants::satellite_pairs;
 
 using Eigen::Vector3d;
 
-bool has_place(const GnssFix& fix) {
-  return std::isfinite(fix.latitude_deg) && std::isfinite(fix.longitude_deg);
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+template <typename Of>
+Vector3d median_place(const std::vector<SatellitePair>& pairs, Of of) {
+  Vector3d place;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const SatellitePair& pair : pairs)
+      values.push_back(of(pair)[axis]);
+    place[axis] = median_of(std::move(values));
+  }
+  return place;
+}
+
+// The first fix that is not far from the median of all: one false fix does not tell the frame.
+const GnssFix& first_of_most(const std::vector<GnssFix>& fixes) {
+  std::vector<double> latitudes, longitudes;
+  for (const GnssFix& fix : fixes) {
+    latitudes.push_back(fix.latitude_deg);
+    longitudes.push_back(fix.longitude_deg);
+  }
+  const double latitude = median_of(std::move(latitudes));
+  const double longitude = median_of(std::move(longitudes));
+  for (const GnssFix& fix : fixes) {
+    if (std::abs(fix.latitude_deg - latitude) <= kFarOriginDeg &&
+        std::abs(fix.longitude_deg - longitude) <= kFarOriginDeg)
+      return fix;
+  }
+  return fixes.front();
 }
 
 // "2017-08-15T10:00:05Z", of what looks like a date.
@@ -48,81 +80,120 @@ std::string no_common_time(const std::vector<StampedPose>& trajectory,
       moment(trajectory.back().stamp));
 }
 
+// Of fixes that are left out, `left_out` has the stamps.
 std::vector<SatellitePair> gathered(const std::vector<SatellitePair>& single,
-                                    const PairingConfig& config) {
+                                    const std::vector<TimeNs>& stamps, const PairingConfig& config,
+                                    std::set<TimeNs>& left_out) {
   const double whole_s = single.back().time_s - single.front().time_s;
   const double interval_s =
       std::max(config.interval_s, whole_s / static_cast<double>(config.most_pairs));
   std::vector<SatellitePair> pairs;
   GatheredPair now;
-  for (const SatellitePair& one : single) {
-    if (now.fixes() > 0 && one.time_s - now.begin_s() >= interval_s) {
-      pairs.push_back(now.mean());
-      now = {};
+  std::size_t begin = 0;
+  const auto take = [&](std::size_t end) {
+    pairs.push_back(now.mean());
+    const std::vector<char> out = now.left_out();
+    for (std::size_t i = begin; i < end; ++i) {
+      if (out[i - begin] != 0) left_out.insert(stamps[i]);
     }
-    now.add(one);
+    now = {};
+    begin = end;
+  };
+  for (std::size_t i = 0; i < single.size(); ++i) {
+    if (now.fixes() > 0 && single[i].time_s - now.begin_s() >= interval_s) take(i);
+    now.add(single[i]);
   }
-  pairs.push_back(now.mean());
+  take(single.size());
   return pairs;
 }
 
 }  // namespace
 
-void GatheredPair::add(const SatellitePair& one) {
-  if (sum_.fixes == 0) begin_s_ = one.time_s;
-  sum_.time_s += one.time_s;
-  sum_.antenna_in_world += one.antenna_in_world;
-  sum_.velocity_in_world += one.velocity_in_world;
-  sum_.fix_in_enu += one.fix_in_enu;
-  sum_.has_height = (sum_.fixes == 0 || sum_.has_height) && one.has_height;
-  if (std::isfinite(one.turn_rad)) {
-    turns_ += Eigen::Vector2d(std::cos(one.turn_rad), std::sin(one.turn_rad));
-    turn_sds_ += one.turn_sd_rad;
-    ++headings_;
+std::vector<char> GatheredPair::left_out() const {
+  std::vector<char> out(singles_.size(), 0);
+  if (singles_.size() < kFewestToCompare) return out;
+  const auto fix_of = [](const SatellitePair& pair) { return pair.fix_in_enu; };
+  const auto antenna_of = [](const SatellitePair& pair) { return pair.antenna_in_world; };
+  const Vector3d fix = median_place(singles_, fix_of);
+  const Vector3d antenna = median_place(singles_, antenna_of);
+  // Plane and height apart. The motion between both frames keeps lengths, so the way of the antenna
+  // counts whichever way it went.
+  std::vector<double> plane, height;
+  double moved = 0.0;
+  for (const SatellitePair& one : singles_) {
+    plane.push_back((one.fix_in_enu - fix).head<2>().norm());
+    height.push_back(std::abs(one.fix_in_enu.z() - fix.z()));
+    moved = std::max(moved, (one.antenna_in_world - antenna).norm());
   }
-  sum_.covariance = sum_.fixes == 0 ? one.covariance : sum_.covariance + one.covariance;
-  ++sum_.fixes;
+  const double most_plane = moved + std::max(kFarFixM, kFarFixMedians * median_of(plane));
+  const double most_height = moved + std::max(kFarFixM, kFarFixMedians * median_of(height));
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = plane[i] > most_plane || height[i] > most_height ? 1 : 0;
+  return out;
 }
 
 SatellitePair GatheredPair::mean() const {
-  SatellitePair pair = sum_;
-  const auto n = static_cast<double>(sum_.fixes);
+  const std::vector<char> out = left_out();
+  SatellitePair pair;
+  Eigen::Vector2d turns = Eigen::Vector2d::Zero();
+  double turn_sds = 0.0;
+  std::size_t headings = 0;
+  for (std::size_t i = 0; i < singles_.size(); ++i) {
+    if (out[i] != 0) continue;
+    const SatellitePair& one = singles_[i];
+    pair.time_s += one.time_s;
+    pair.antenna_in_world += one.antenna_in_world;
+    pair.velocity_in_world += one.velocity_in_world;
+    pair.fix_in_enu += one.fix_in_enu;
+    pair.has_height = (pair.fixes == 0 || pair.has_height) && one.has_height;
+    if (std::isfinite(one.turn_rad)) {
+      turns += Eigen::Vector2d(std::cos(one.turn_rad), std::sin(one.turn_rad));
+      turn_sds += one.turn_sd_rad;
+      ++headings;
+    }
+    pair.covariance = pair.fixes == 0 ? one.covariance : pair.covariance + one.covariance;
+    ++pair.fixes;
+  }
+  const auto n = static_cast<double>(pair.fixes);
   pair.time_s /= n;
   pair.antenna_in_world /= n;
   pair.velocity_in_world /= n;
   pair.fix_in_enu /= n;
   pair.covariance /= n;
-  if (headings_ > 0) {
-    pair.turn_rad = std::atan2(turns_.y(), turns_.x());
-    pair.turn_sd_rad = turn_sds_ / static_cast<double>(headings_);
+  if (headings > 0) {
+    pair.turn_rad = std::atan2(turns.y(), turns.x());
+    pair.turn_sd_rad = turn_sds / static_cast<double>(headings);
   }
   return pair;
 }
 
 void GatheredPair::save(BinaryWriter& writer) const {
-  writer.put(begin_s_);
-  writer.put(sum_.time_s);
-  for (const Vector3d* v : {&sum_.antenna_in_world, &sum_.velocity_in_world, &sum_.fix_in_enu})
-    writer.put_doubles(v->data(), 3);
-  writer.put(sum_.has_height);
-  writer.put_doubles(sum_.covariance.data(), 9);
-  writer.put(static_cast<std::uint64_t>(sum_.fixes));
-  writer.put_doubles(turns_.data(), 2);
-  writer.put(turn_sds_);
-  writer.put(headings_);
+  writer.put(static_cast<std::uint64_t>(singles_.size()));
+  for (const SatellitePair& one : singles_) {
+    writer.put(one.time_s);
+    for (const Vector3d* v : {&one.antenna_in_world, &one.velocity_in_world, &one.fix_in_enu})
+      writer.put_doubles(v->data(), 3);
+    writer.put(one.has_height);
+    writer.put(one.turn_rad);
+    writer.put(one.turn_sd_rad);
+    writer.put_doubles(one.covariance.data(), 9);
+    writer.put(static_cast<std::uint64_t>(one.fixes));
+  }
 }
 
 void GatheredPair::load(BinaryReader& reader) {
-  begin_s_ = reader.get<double>();
-  sum_.time_s = reader.get<double>();
-  for (Vector3d* v : {&sum_.antenna_in_world, &sum_.velocity_in_world, &sum_.fix_in_enu})
-    reader.get_doubles(v->data(), 3);
-  sum_.has_height = reader.get<bool>();
-  reader.get_doubles(sum_.covariance.data(), 9);
-  sum_.fixes = reader.get<std::uint64_t>();
-  reader.get_doubles(turns_.data(), 2);
-  turn_sds_ = reader.get<double>();
-  headings_ = reader.get<std::uint64_t>();
+  singles_.clear();
+  for (auto left = reader.get<std::uint64_t>(); left > 0; --left) {
+    SatellitePair& one = singles_.emplace_back();
+    one.time_s = reader.get<double>();
+    for (Vector3d* v : {&one.antenna_in_world, &one.velocity_in_world, &one.fix_in_enu})
+      reader.get_doubles(v->data(), 3);
+    one.has_height = reader.get<bool>();
+    one.turn_rad = reader.get<double>();
+    one.turn_sd_rad = reader.get<double>();
+    reader.get_doubles(one.covariance.data(), 9);
+    one.fixes = reader.get<std::uint64_t>();
+  }
 }
 
 double turn_by_heading(const GnssFix& fix, const Vector3d& baseline_in_world) {
@@ -158,7 +229,7 @@ SatellitePairs pair_by_time(const std::vector<StampedPose>& trajectory,
                             const std::vector<GnssFix>& given, const PairingConfig& config) {
   SatellitePairs result;
   std::vector<GnssFix> fixes;
-  std::copy_if(given.begin(), given.end(), std::back_inserter(fixes), has_place);
+  std::copy_if(given.begin(), given.end(), std::back_inserter(fixes), is_on_globe);
   if (fixes.empty() || trajectory.empty()) {
     result.reason = "expected fixes with a position, and a path";
     return result;
@@ -166,7 +237,7 @@ SatellitePairs pair_by_time(const std::vector<StampedPose>& trajectory,
   const auto height = [](const GnssFix& fix) {
     return std::isfinite(fix.height_m) ? fix.height_m : 0.0;
   };
-  const GnssFix& first = fixes.front();
+  const GnssFix& first = first_of_most(fixes);
   result.origin = {first.latitude_deg, first.longitude_deg, height(first)};
   const EastNorthUp frame(*result.origin);
   sort_stably(fixes, [](const GnssFix& a, const GnssFix& b) { return a.stamp < b.stamp; });
@@ -174,6 +245,7 @@ SatellitePairs pair_by_time(const std::vector<StampedPose>& trajectory,
   const TimeNs shift = from_seconds(config.time_offset_s);
   const Vector3d& arm = config.antenna_in_body;
   std::vector<SatellitePair> single;
+  std::vector<TimeNs> stamps;
   for (const GnssFix& fix : fixes) {
     const TimeNs stamp = fix.stamp + shift;
     const auto place = antenna_place(trajectory, arm, stamp);
@@ -192,14 +264,16 @@ SatellitePairs pair_by_time(const std::vector<StampedPose>& trajectory,
     one.fix_in_enu = frame.from_place({fix.latitude_deg, fix.longitude_deg, height(fix)});
     one.has_height = std::isfinite(fix.height_m);
     one.covariance = fix_covariance(fix, config.covariance);
+    one.fixes = 1;
     single.push_back(one);
+    stamps.push_back(fix.stamp);
   }
   result.fixes_in_time = single.size();
   if (single.empty()) {
     result.reason = no_common_time(trajectory, fixes);
     return result;
   }
-  result.pairs = gathered(single, config);
+  result.pairs = gathered(single, stamps, config, result.left_out);
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -50,25 +51,25 @@ struct SatellitePair {
   std::size_t fixes = 0;
 };
 
-// The fixes of one interval, as sums that become a pair.
+// The fixes of one interval, which become a pair.
 class GatheredPair {
  public:
   // `one`: a pair of a single fix.
-  void add(const SatellitePair& one);
-  [[nodiscard]] SatellitePair mean() const;  // there is a fix at least
-  [[nodiscard]] std::size_t fixes() const { return sum_.fixes; }
-  [[nodiscard]] double begin_s() const { return begin_s_; }  // time of the first one
+  void add(const SatellitePair& one) { singles_.push_back(one); }
+  // The mean of those that agree with the others; there is a fix at least. Of three and more, one
+  // is left out that is far from the median of them, farther than the antenna moved meanwhile.
+  [[nodiscard]] SatellitePair mean() const;
+  [[nodiscard]] std::size_t fixes() const { return singles_.size(); }
+  [[nodiscard]] double begin_s() const { return singles_.front().time_s; }  // there is a fix
+  // Of each fix, in the order they came: 1 if it is left out.
+  [[nodiscard]] std::vector<char> left_out() const;
 
   // The state, bit for bit.
   void save(BinaryWriter& writer) const;
   void load(BinaryReader& reader);
 
  private:
-  SatellitePair sum_;
-  double begin_s_ = 0.0;
-  Eigen::Vector2d turns_ = Eigen::Vector2d::Zero();  // sum of cosines and sines
-  double turn_sds_ = 0.0;                            // sum
-  std::uint64_t headings_ = 0;
+  std::vector<SatellitePair> singles_;
 };
 
 // The turn about up from the world to east, north, up by the heading of a fix, rad, -pi to pi.
@@ -78,12 +79,14 @@ class GatheredPair {
 // How good a heading is, rad: as the receiver states, else `heading_sd_deg`.
 [[nodiscard]] double turn_sd_rad(const GnssFix& fix, double heading_sd_deg);
 
-// All pairs of a run, in order of time. Frame east, north, up at the first fix.
+// All pairs of a run, in order of time. Frame east, north, up at the first fix that is not far from
+// most others.
 struct SatellitePairs {
   std::optional<GeodeticPlace> origin;
   std::vector<SatellitePair> pairs;
   TimeNs first_fix = 0;           // where `time_s` of the pairs counts from
   std::size_t fixes_in_time = 0;  // that have a place of the antenna
+  std::set<TimeNs> left_out;      // stamps of fixes that contradict others of their second
   std::string reason;             // why there are none, for a person
 };
 
@@ -93,7 +96,7 @@ struct SatellitePairs {
     const std::vector<StampedPose>& trajectory, const Eigen::Vector3d& antenna_in_body,
     TimeNs stamp);
 
-// Fixes without a finite latitude and longitude are passed over. Deterministic; thread-safe.
+// Fixes without a place on the globe are passed over. Deterministic; thread-safe.
 [[nodiscard]] SatellitePairs pair_by_time(const std::vector<StampedPose>& trajectory,
                                           const std::vector<GnssFix>& fixes,
                                           const PairingConfig& config);

@@ -8,6 +8,7 @@
 #include "understory/pipeline/source.h"
 #include "understory/recording/captures/nmea.h"
 #include "understory/recording/captures/rtklib.h"
+#include "understory/sensor/fix_position.h"
 #include "understory/util/error.h"
 #include "understory/util/files/csv.h"
 #include "understory/util/files/text_file.h"
@@ -16,11 +17,6 @@ namespace understory {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool is_position(const GnssFix& fix) {
-  return std::isfinite(fix.latitude_deg) && std::isfinite(fix.longitude_deg) &&
-         std::abs(fix.latitude_deg) <= 90.0 && std::abs(fix.longitude_deg) <= 360.0;
-}
 
 // The first byte that is no white space of a plain file; 0 if there is none.
 char first_letter(const std::string& file) {
@@ -92,7 +88,7 @@ std::vector<GnssFix> read_fixes(const std::string& file, Log& log) {
   } else {
     fixes = read_recording(file, log);
   }
-  std::erase_if(fixes, [](const GnssFix& fix) { return !is_position(fix); });
+  std::erase_if(fixes, [](const GnssFix& fix) { return !is_on_globe(fix); });
   if (fixes.empty()) throw InputError(file, "", "expected GNSS fixes with a position: none there");
   return fixes;
 }

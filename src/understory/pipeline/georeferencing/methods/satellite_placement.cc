@@ -59,11 +59,13 @@ void doubt(const GeoreferenceRequest& request, const MovableRun& run, const Sate
   // A carrier that stands is placed by headings: its fixes may scatter over more than its path.
   const bool by_headings = fit.headings && std::isnan(fit.headings->off_rad);
   const double reach_m = by_headings ? std::max(extent, kStandingReachM) : extent;
-  if (fit.plane_rms_m > SatelliteFitConfig().most_misfit * reach_m)
+  // Where many are left out, the others may agree by chance.
+  const double misfit_m = fit.left_out_share > kMostLeftOut ? fit.all_plane_rms_m : fit.plane_rms_m;
+  if (misfit_m > SatelliteFitConfig().most_misfit * reach_m)
     placement.doubt(fmt::format(
         "the fixes lie {:.1f} m off the path (root mean square), which spans {:.0f} m: are they "
         "fixes of this run?",
-        fit.plane_rms_m, extent));
+        misfit_m, extent));
 }
 
 void tell_headings(const UsedHeadings& headings, Placement& placement) {
