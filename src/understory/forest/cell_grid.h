@@ -52,12 +52,13 @@ class CellGrid {
   }
 
   // The blocks' bounds in cells. A few stray points far away must not make the area huge. Where it
-  // has more than `most` cells, blocks with fewer than `few` points are left out.
+  // has more than `most` cells, blocks with fewer than `few` points are left out. If that is not
+  // enough, those with fewer than four times as many are, and so on.
   [[nodiscard]] Bounds bounds(std::uint64_t most, std::uint64_t few) const {
     Bounds all = bounds_of(0);
-    const auto area =
-        static_cast<std::uint64_t>(all.columns) * static_cast<std::uint64_t>(all.rows);
-    return area > most ? bounds_of(few) : all;
+    for (std::uint64_t least = few; cells_of(all) > most; least *= 4)
+      all = bounds_of(least);
+    return all;
   }
 
   // Adds another grid with cells of the same size: visit(own cell, other cell).
@@ -95,6 +96,9 @@ class CellGrid {
   static std::size_t index_in(const std::pair<int, int>& block, int column, int row) {
     return static_cast<std::size_t>((row - block.first * kBlock) * kBlock + column -
                                     block.second * kBlock);
+  }
+  static std::uint64_t cells_of(const Bounds& bounds) {
+    return static_cast<std::uint64_t>(bounds.columns) * static_cast<std::uint64_t>(bounds.rows);
   }
   [[nodiscard]] Bounds bounds_of(std::uint64_t few) const {
     bool first = true;

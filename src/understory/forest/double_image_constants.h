@@ -42,4 +42,17 @@ inline constexpr std::size_t kFewestTwice = 8;
 inline constexpr double kTwiceShare = 0.04;
 // Share of the stems seen all round whose outlines tell of two scans, for the same [chosen]
 inline constexpr double kOvalShare = 0.3;
+// m between the images of a whole cloud that was laid on itself wrongly, at most [chosen: an error
+// of satellite fixes below trees]
+inline constexpr double kFarApart = 3.0;
+// Offsets that are tried, the fullest first [bound: time]
+inline constexpr int kMostOffsets = 8;
+// m by which such images differ at most from the offset of all [chosen: errors of two positions]
+inline constexpr double kFarAgree = 0.15;
+// Share of the trees that have an image at the offset, at least [chosen: half of a cloud may be
+// seen once; tuned on random seeds, where the fullest offset has a tenth]
+inline constexpr double kFarShare = 0.4;
+// Differences of diameters within pairs over those of trees taken at random, both root mean
+// squares, at most [chosen: half of what neighbours of like diameter have]
+inline constexpr double kFarAlike = 0.2;
 }  // namespace understory::double_image_constants

@@ -37,6 +37,17 @@ TEST(LowNoise, NothingOfTheGroundIsNoise) {
   EXPECT_TRUE(noise.holds({5.0, 5.0, 299.0}));
 }
 
+// A regression: twenty points at 0, 0 of a cloud in map coordinates asked for all memory.
+TEST(LowNoise, PointsAtTheOriginOfTheMapAskForNoMemory) {
+  Cloud points = sloping_cloud();
+  for (Eigen::Vector3d& point : points)
+    point += Eigen::Vector3d(400e3, 6800e3, 0.0);
+  for (int i = 0; i < 50; ++i)
+    points.emplace_back(0.0, 0.0, 0.0);
+  const LowNoise noise(blocks_of(points));
+  EXPECT_FALSE(noise.holds(points.front()));
+}
+
 TEST(LowNoise, WhereNothingIsKnownNothingIsNoise) {
   const Cloud points = sloping_cloud();
   const LowNoise noise(blocks_of(points));

@@ -144,6 +144,98 @@ void find_twins(const std::vector<StemFit>& stems, DoubleImages& images) {
   images.apart_m = upper_median(apart);
 }
 
+// All pairs of alike stems farther apart than `kMostApart`, each with its vector to one side.
+std::vector<ImagePair> far_pairs_of(const std::vector<StemFit>& stems, const Places& places) {
+  std::vector<ImagePair> pairs;
+  for (std::size_t i = 0; i < stems.size(); ++i) {
+    for (const std::size_t j : places.near(stems[i].centre, kFarApart, stems.size())) {
+      const Vector2d apart = stems[j].centre - stems[i].centre;
+      const bool to_one_side = apart.x() > 0.0 || (apart.x() == 0.0 && apart.y() > 0.0);
+      if (to_one_side && apart.norm() > kMostApart && are_alike(stems[i], stems[j]))
+        pairs.push_back({i, j, apart, Vector2d::Zero()});
+    }
+  }
+  return pairs;
+}
+
+// Pairs by an offset that they share, of stems that have one image there.
+std::vector<ImagePair> images_at(const std::vector<ImagePair>& pairs,
+                                 const std::vector<std::size_t>& chosen, std::size_t stems) {
+  std::vector<int> in_pairs(stems, 0);
+  for (const std::size_t k : chosen) {
+    ++in_pairs[pairs[k].a];
+    ++in_pairs[pairs[k].b];
+  }
+  // In rows of trees each one has a neighbour before and behind.
+  std::vector<ImagePair> images;
+  for (const std::size_t k : chosen) {
+    if (in_pairs[pairs[k].a] == 1 && in_pairs[pairs[k].b] == 1) images.push_back(pairs[k]);
+  }
+  return images;
+}
+
+// Root mean square difference of the radii of two trees taken at random.
+double usual_difference_m(const std::vector<StemFit>& stems) {
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const StemFit& stem : stems) {
+    sum += stem.radius_m;
+    squares += stem.radius_m * stem.radius_m;
+  }
+  const auto count = static_cast<double>(stems.size());
+  return std::sqrt(std::max(0.0, 2.0 * (squares / count - sum * sum / (count * count))));
+}
+
+// Whether these pairs, of one offset, are images of most trees.
+bool are_images(const std::vector<ImagePair>& pairs, const std::vector<StemFit>& stems) {
+  const double trees = 2.0 * static_cast<double>(pairs.size());
+  if (pairs.size() < kFewestTwice || trees < kFarShare * static_cast<double>(stems.size()))
+    return false;
+  double squares = 0.0;
+  for (const ImagePair& pair : pairs) {
+    const double difference = stems[pair.a].radius_m - stems[pair.b].radius_m;
+    squares += difference * difference;
+  }
+  const double alike = std::sqrt(squares / static_cast<double>(pairs.size()));
+  return alike < kFarAlike * usual_difference_m(stems);
+}
+
+// A cloud that was laid on itself far off. The offsets that most pairs share are tried, the fullest
+// first: in planted stands rows share one as well.
+void find_far_twins(const std::vector<StemFit>& stems, DoubleImages& images) {
+  std::vector<Vector2d> centres;
+  for (const StemFit& stem : stems)
+    centres.push_back(stem.centre);
+  std::vector<ImagePair> pairs = far_pairs_of(stems, Places(centres));
+  for (int tried = 0; tried < kMostOffsets && pairs.size() >= kFewestTwice; ++tried) {
+    std::vector<Vector2d> vectors;
+    for (const ImagePair& pair : pairs)
+      vectors.push_back(pair.apart);
+    const Places offsets(vectors);
+    std::vector<std::size_t> fullest;
+    for (const Vector2d& apart : vectors) {
+      std::vector<std::size_t> near = offsets.near(apart, kFarAgree, pairs.size());
+      if (near.size() > fullest.size()) fullest = std::move(near);
+    }
+    const std::vector<ImagePair> found = images_at(pairs, fullest, stems.size());
+    if (!are_images(found, stems)) {
+      const Vector2d middle = pairs[fullest.front()].apart;
+      std::erase_if(pairs, [&](const ImagePair& pair) {
+        return (pair.apart - middle).norm() < 2.0 * kFarAgree;
+      });
+      continue;
+    }
+    std::vector<double> apart;
+    for (const ImagePair& pair : found) {
+      images.twice[pair.a] = images.twice[pair.b] = 1;
+      apart.push_back(pair.apart.norm());
+    }
+    images.trees = 2 * found.size();
+    images.apart_m = upper_median(apart);
+    return;
+  }
+}
+
 // How far two scans lie apart by the mean outline of stems. 0: not clearly.
 double apart_by_outlines(const std::vector<const StemFit*>& stems) {
   const auto count = static_cast<double>(stems.size());
@@ -212,6 +304,7 @@ DoubleImages find_double_images(const std::vector<StemFit>& stems) {
   images.twice.assign(stems.size(), 0);
   images.oval_m.assign(stems.size(), 0.0);
   find_twins(stems, images);
+  if (complaint_of(images).empty()) find_far_twins(stems, images);
   find_ovals(stems, images);
   return images;
 }

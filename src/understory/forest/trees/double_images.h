@@ -25,7 +25,8 @@ struct DoubleImages {
 // most pairs nearby lie apart by the same vector. Forks lie in all directions. Where a third stem
 // goes on in the same line, they stand in a row. An outline tells of two scans where the stems
 // around are as long in the same direction, and longer than trees grow. `stems` in one frame.
-// Deterministic.
+// A cloud that was laid on itself up to 3 m off is told by one offset that most stems share, with
+// diameters that agree. Deterministic.
 [[nodiscard]] DoubleImages find_double_images(const std::vector<StemFit>& stems);
 
 // Why a list of trees is not to be trusted, in words for a forester; empty: nothing says so.

@@ -58,6 +58,41 @@ TEST(DoubleImages, APartThatIsSeenTwiceIsMarked) {
   EXPECT_FALSE(complaint_of(images).empty());
 }
 
+TEST(DoubleImages, ACloudLaidOnItselfFarOffIsTold) {
+  for (const Vector2d& apart : {Vector2d(0.0, 0.7), Vector2d(-0.8, 0.6), Vector2d(2.0, 1.5)}) {
+    const DoubleImages images = find_double_images(seen_twice(scattered_stand(5, 6), apart));
+    EXPECT_GE(images.trees, 44U) << apart.transpose();
+    EXPECT_NEAR(images.apart_m, apart.norm(), 0.01);
+    EXPECT_NE(complaint_of(images).find("stand twice"), std::string::npos);
+  }
+}
+
+TEST(DoubleImages, NeighboursAreNoImagesOfEachOther) {
+  for (std::uint64_t seed = 10; seed < 30; ++seed) {
+    // 2,500 trees a hectare.
+    std::vector<StemFit> dense = scattered_stand(8, seed);
+    for (StemFit& stem : dense)
+      stem.centre *= 0.5;
+    EXPECT_EQ(complaint_of(find_double_images(dense)), "") << seed;
+  }
+}
+
+TEST(DoubleImages, PlantedRowsAreNoImages) {
+  Random random(7);
+  std::vector<StemFit> rows, pairs_of_rows;
+  for (int i = 0; i < 10; ++i) {
+    for (int j = 0; j < 10; ++j) {
+      const double radius = 0.1 + 0.02 * random.normal();
+      const Vector2d moved(0.03 * random.normal(), 0.03 * random.normal());
+      rows.push_back(stem_at(Vector2d(2.0 * i, 2.5 * j) + moved, radius));
+      pairs_of_rows.push_back(
+          stem_at(Vector2d(2.5 * i, 4.0 * (j / 2) + 1.2 * (j % 2)) + moved, radius));
+    }
+  }
+  EXPECT_EQ(complaint_of(find_double_images(rows)), "");
+  EXPECT_EQ(complaint_of(find_double_images(pairs_of_rows)), "");
+}
+
 TEST(DoubleImages, ForksAndRowsAreNoImages) {
   Random random(3);
   std::vector<StemFit> forks = scattered_stand(6, 4);

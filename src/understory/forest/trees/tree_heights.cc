@@ -5,13 +5,13 @@
 #include <limits>
 #include <utility>
 
-#include "understory/forest/forest_constants.h"
 #include "understory/forest/stems/stem_axis.h"
+#include "understory/forest/tree_height_constants.h"
 
 namespace understory {
 namespace {
 
-using namespace forest_constants::tree_heights;
+using namespace tree_height_constants;
 
 Eigen::Vector2i cell_of(const Eigen::Vector2d& place) {
   return (place / kCell).array().floor().cast<int>();
