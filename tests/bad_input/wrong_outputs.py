@@ -7,9 +7,10 @@ import json
 import os
 import pathlib
 import shutil
+import subprocess
 import zlib
 
-from program import Cases, program, unfinished_run
+from program import PROGRAM, Cases, program, unfinished_run
 
 RESULTS = ["trajectory.tum", "odometry.tum", "keyframes.tum", "states.csv.gz", "stems.csv.gz", "graph.g2o", "gnss.csv",
            "global.csv.gz", "steps.csv", "loops.csv", "corrections.csv", "map.laz", "map.copc.laz", "trees.csv", "felled.csv", "cuts.csv", "trees.gpkg",
@@ -287,6 +288,17 @@ def no_file(folder):
                 expect_refused(command, f"{way} for a file", output, folder, "--overwrite")
         for ending in (".las", ".csv", ".bag", ".pcap.gz"):
             expect_refused(command, f"an ending {ending}", folder / f"wrong{ending}", folder, codes=(2,))
+
+
+@cases.case("standard streams that are closed")
+def closed_streams(folder):
+    # Their numbers went to the next files that were opened, and words of the program into these.
+    for streams in (">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"):
+        output = folder / "closed.mcap"
+        done = subprocess.run(["sh", "-c", f'"$@" {streams}', "sh", PROGRAM, "simulate", "demo", "-o", output, "--overwrite",
+                               "--duration-s", "1", "--set", "lidar.columns=100"], timeout=120)
+        assert done.returncode == 0, f"{streams}: exit code {done.returncode}"
+        assert output.read_bytes().startswith(b"\x89MCAP0\r\n"), f"{streams}: the recording begins with words"
 
 
 @cases.case("what lies beside a simulated recording")

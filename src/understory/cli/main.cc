@@ -1,3 +1,4 @@
+#include <fcntl.h>
 #include <malloc.h>
 
 #include <algorithm>
@@ -36,6 +37,16 @@ void keep_freed_memory() {
   mallopt(M_MMAP_THRESHOLD, 32 << 20);
   mallopt(M_TRIM_THRESHOLD, 256 << 20);
   mallopt(M_TOP_PAD, 16 << 20);
+}
+
+// A file that is opened takes the lowest free descriptor. Where the caller closed one of the first
+// three, the words of the program would go into that file.
+void keep_standard_streams() {
+  for (int descriptor = 0; descriptor < 3; ++descriptor) {
+    if (fcntl(descriptor, F_GETFD) >= 0) continue;
+    // Those below are open, so this takes the place.
+    if (open("/dev/null", descriptor == 0 ? O_RDONLY : O_WRONLY) < 0) std::abort();
+  }
 }
 
 // What was printed may wait in memory until now: a full disk behind `> FILE` would lose it in
@@ -231,5 +242,6 @@ int run(int argc, char** argv) {
 }  // namespace understory
 
 int main(int argc, char** argv) {
+  understory::keep_standard_streams();
   return understory::run(argc, argv);
 }

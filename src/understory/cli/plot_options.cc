@@ -8,7 +8,10 @@ void add_plot_options(CLI::App& command, PlotOptions& options) {
       "Sample plots that get figures of their own, in the coordinates of trees.gpkg. "
       "X,Y,R (one circle), a .csv with id,x,y,radius_m, or a GeoPackage with polygons "
       "or with points and radius_m");
-  command.add_option("--plot-grid", options.grid_m, "Figures by grid cells of this side, metres");
+  command
+      .add_option("--plot-grid", options.grid_m,
+                  "Figures by grid cells of this side, metres (1 to 1000)")
+      ->check(CLI::Range(1.0, 1000.0));
 }
 
 std::vector<std::string> plot_settings(const PlotOptions& options, const std::string& prefix) {

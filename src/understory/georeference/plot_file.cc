@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -169,6 +170,15 @@ PlotOutline outline_of(const OGRFeature& feature, const SystemChange& change,
                      fmt::format("expected a polygon or a point, not a {}",
                                  OGRGeometryTypeToName(straight->getGeometryType())));
   }
+  // Of such an outline some ground would count twice, or as outside.
+  const double area =
+      std::accumulate(plot.rings.begin(), plot.rings.end(), 0.0,
+                      [](double sum, const PlaneRing& ring) { return sum + signed_area_m2(ring); });
+  if (area > 0.0 && straight->IsValid() == 0)
+    throw InputError(
+        file, "plot " + id,
+        "expected an outline that does not cross itself, of parts that do not overlap. "
+        "QGIS repairs it: Vector geometry, Fix geometries");
   if (type != wkbPoint && plot.rings.empty())
     throw InputError(file, "plot " + id, "expected an outline with an area");
   return plot;

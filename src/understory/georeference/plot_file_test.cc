@@ -110,5 +110,15 @@ TEST_F(PlotFile, PolygonsHaveHolesAndAnArea) {
       "with an area", "EPSG:3067");
 }
 
+TEST_F(PlotFile, OutlinesThatCrossThemselvesOrOverlapAreRefused) {
+  expect_refused(json(R"({"type":"Polygon","coordinates":[[[27.0,62.0],[27.002,62.0],
+               [27.0,62.001],[27.001,62.002],[27.0,62.0]]]})"),
+                 "does not cross itself", "EPSG:3067");
+  expect_refused(json(R"({"type":"MultiPolygon","coordinates":[
+               [[[27.0,62.0],[27.002,62.0],[27.002,62.001],[27.0,62.001],[27.0,62.0]]],
+               [[[27.001,62.0],[27.003,62.0],[27.003,62.001],[27.001,62.001],[27.001,62.0]]]]})"),
+                 "parts that do not overlap", "EPSG:3067");
+}
+
 }  // namespace
 }  // namespace understory

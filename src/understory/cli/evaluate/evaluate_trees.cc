@@ -56,9 +56,12 @@ std::optional<VisibleTreeErrors> compare_visible(const TreeOptions& options,
   return compare_visible_trees(a, b, pairs, visibility);
 }
 
-void warn_of_list(const std::string& name, const std::vector<Tree>& trees, Log& log) {
-  for (const std::string& complaint : {diameter_complaint(trees), doubles_complaint(trees)})
+// Whether the list can be compared as it stands.
+bool warn_of_list(const std::string& name, const std::vector<Tree>& trees, Log& log) {
+  const std::string unit = diameter_complaint(trees);
+  for (const std::string& complaint : {unit, doubles_complaint(trees)})
     if (!complaint.empty()) log.warn("evaluate.trees", name + ": " + complaint);
+  return unit.empty();
 }
 
 int evaluate_trees(const TreeOptions& options, CommandContext& context) {
@@ -68,8 +71,9 @@ int evaluate_trees(const TreeOptions& options, CommandContext& context) {
   if (!options.output.empty()) throw ConfigError({"-o needs --epochs"});
   std::vector<Tree> a = read_trees(file_in_folder(options.a, "trees.csv"));
   const std::vector<Tree> b = read_trees(file_in_folder(options.b, "trees.csv"));
-  warn_of_list(options.a, a, context.log);
-  warn_of_list(options.b, b, context.log);
+  const bool units_a = warn_of_list(options.a, a, context.log);
+  const bool units_b = warn_of_list(options.b, b, context.log);
+  const bool in_metres = units_a && units_b;
   const Alignment alignment = alignment_from_name(options.alignment);
   bool aligned = true;
   TreeComparison result;
@@ -87,13 +91,13 @@ int evaluate_trees(const TreeOptions& options, CommandContext& context) {
                                           ? assign_trees(a, b, options.assignment)
                                           : match_trees(a, b, options.assignment.radius_m);
   result.all = errors_of_pairs(a, b, pairs);
-  result.by_diameter = errors_by_diameter(a, b, pairs, options.class_m);
+  if (in_metres) result.by_diameter = errors_by_diameter(a, b, pairs, options.class_m);
   result.visible = compare_visible(options, a, b, pairs);
   compare_along_paths(options, a, b, pairs, result);
   const std::string text = options.json ? comparison_json(result, options).dump(2) + "\n"
                                         : comparison_text(result, options);
   std::fputs(text.c_str(), stdout);
-  return aligned ? kExitDone : kExitUntrusted;
+  return aligned && in_metres ? kExitDone : kExitUntrusted;
 }
 
 void add_path_options(CLI::App& command, TreeOptions& options) {

@@ -183,10 +183,11 @@ void judge_plots(const std::vector<StandPlot>& plots, const StandTableConfig& co
   }
   result.no_overlap = !plots.empty() && !any;
   if (in_part > 0)
-    result.remarks.push_back(fmt::format(
-        "{} beyond what was seen ({} of plot {}). Figures take the rest for like what was seen.",
-        in_part == 1 ? "1 plot goes" : fmt::format("{} plots go", in_part),
-        percent(least->figures.seen_share), least->shape.id));
+    result.remarks.push_back(
+        fmt::format("{} beyond what was seen ({} of plot {}). The figures assume that the unseen "
+                    "part of a plot is like the seen part.",
+                    in_part == 1 ? "1 plot goes" : fmt::format("{} plots go", in_part),
+                    percent(least->figures.seen_share), least->shape.id));
   if (without > 0)
     result.complaint = fmt::format(
         "{} no figures: less than {:.0f} % was seen ({} of plot {}). Stems were seen at {}",

@@ -4,6 +4,7 @@
 #include <laszip/laszip_api.h>
 
 #include <cmath>
+#include <functional>
 
 #include "understory/recording/bags/byte_source.h"
 #include "understory/recording/captures/packet_test_support.h"
@@ -282,7 +283,8 @@ TEST(Lzf, RefusesReferencesBeforeTheStart) {
 }
 
 // A LAS file in a coordinate system, written by LASzip.
-void write_las(const std::string& path, int format, bool compressed) {
+void write_las(const std::string& path, int format, bool compressed,
+               const std::function<void(laszip_point&, int)>& change = {}) {
   laszip_POINTER writer = nullptr;
   laszip_create(&writer);
   laszip_header* header = nullptr;
@@ -314,6 +316,7 @@ void write_las(const std::string& path, int format, bool compressed) {
     // Classes beyond 31 have no place in the old field.
     point->classification = static_cast<laszip_U8>(i % 2 == 0 ? 2 : modern ? 0 : 5) & 0x1F;
     point->extended_classification = static_cast<laszip_U8>(i % 2 == 0 ? 2 : 65);
+    if (change) change(*point, i);
     ASSERT_EQ(laszip_write_point(writer), 0);
   }
   ASSERT_EQ(laszip_close_writer(writer), 0);
@@ -340,6 +343,28 @@ TEST(CloudFile, ReadsLasAndLazInACoordinateSystem) {
         EXPECT_EQ(cloud.classification[k], i % 2 == 0 ? 2 : format == 6 ? 65 : 5);
       }
       EXPECT_TRUE(log.warnings().empty()) << test::all_warnings(log);
+    }
+  }
+}
+
+// A regression: noise was mapped as all other points, and told that z is not up.
+TEST(CloudFile, LeavesOutNoiseAndWithheldPoints) {
+  const test::TemporaryFolder folder;
+  for (const int format : {1, 6}) {
+    for (const bool compressed : {false, true}) {
+      const std::string path = folder / (compressed ? "cloud.laz" : "cloud.las");
+      write_las(path, format, compressed, [&](laszip_point& point, int i) {
+        if (i == 3) point.classification = point.extended_classification = 7;
+        if (i == 4) point.classification = point.extended_classification = 18;
+        const bool withheld = i == 5;
+        point.withheld_flag = withheld ? 1 : 0;
+        point.extended_classification_flags = withheld ? 4 : 0;
+      });
+      Log log;
+      const PointCloudFile cloud = read_cloud(path, log);
+      EXPECT_EQ(cloud.points.size(), kCloudPoints - 3U) << cloud.format;
+      EXPECT_EQ(test::count_of(log, "recording.noise"), 1U) << test::all_warnings(log);
+      EXPECT_NE(test::all_warnings(log).find("3 points are left out"), std::string::npos);
     }
   }
 }

@@ -32,6 +32,9 @@ using namespace las_bytes;
 constexpr std::size_t kSmallestHeader = 227;
 constexpr std::size_t kLargestPoint = 4096;
 constexpr std::array<std::uint32_t, 11> kRecordLengths{20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
+// Classes of the standard.
+constexpr std::uint8_t kLowNoise = 7;
+constexpr std::uint8_t kHighNoise = 18;
 constexpr std::size_t kTreeColumns = sizeof(std::uint32_t) + sizeof(float);
 
 std::uint32_t plain_length(const LasHeader& header) {
@@ -69,6 +72,7 @@ class PointDecoder {
     point.intensity = intensity;
     const bool modern = header_.point_format >= 6;
     point.classification = modern ? raw[16] : static_cast<std::uint8_t>(raw[15] & 0x1F);
+    point.withheld = (raw[15] & (modern ? 0x04 : 0x80)) != 0;
     if (header_.has_gps_time) std::memcpy(&point.gps_time, raw + (modern ? 22 : 20), 8);
     if (header_.has_trees) take_columns(raw + plain_length(header_), point);
     return point;
@@ -79,6 +83,8 @@ class PointDecoder {
     point.intensity = raw.intensity;
     point.classification =
         header_.point_format >= 6 ? raw.extended_classification : raw.classification;
+    point.withheld = header_.point_format >= 6 ? (raw.extended_classification_flags & 0x04) != 0
+                                               : raw.withheld_flag != 0;
     point.gps_time = header_.has_gps_time ? raw.gps_time : 0.0;
     if (header_.has_trees && raw.num_extra_bytes >= static_cast<laszip_I32>(kTreeColumns))
       take_columns(raw.extra_bytes, point);
@@ -453,11 +459,24 @@ LasHeader read_las_header(ByteSource& file) {
 
 void read_las_points(ByteSource& file, const LasHeader& header, Log& log,
                      const std::function<void(const LasPoint&)>& visit) {
+  std::uint64_t left_out = 0;
+  const auto visit_used = [&](const LasPoint& point) {
+    const bool noise = point.classification == kLowNoise || point.classification == kHighNoise;
+    if (noise || point.withheld) {
+      ++left_out;
+    } else {
+      visit(point);
+    }
+  };
   if (header.compressed) {
-    read_compressed(file, header, log, visit);
+    read_compressed(file, header, log, visit_used);
   } else {
-    read_uncompressed(file, header, log, visit);
+    read_uncompressed(file, header, log, visit_used);
   }
+  if (left_out > 0)
+    log.warn("recording.noise",
+             file.name() + ": " + std::to_string(left_out) +
+                 " points are left out: they are withheld, or of the classes noise (7, 18)");
 }
 
 }  // namespace understory

@@ -33,6 +33,7 @@ struct LasPoint {
   Eigen::Vector3d position;  // in the file's coordinate system
   float intensity = 0.0F;
   std::uint8_t classification = 0;
+  bool withheld = false;  // marked as not to be used
   double gps_time = 0.0;
   // With LasHeader::has_trees only.
   std::uint32_t tree_id = 0;         // 0: of no tree
@@ -42,8 +43,10 @@ struct LasPoint {
 // LAS 1.0 to 1.4, point formats 0 to 10. Throws InputError if the header cannot be used.
 [[nodiscard]] LasHeader read_las_header(ByteSource& file);
 
-// Calls `visit` for each point; memory does not depend on their number. Where the points break off
-// there is a warning ("recording.damaged"). Throws InputError if there is not one.
+// Calls `visit` for each point that may be used; memory does not depend on their number. Points of
+// the classes noise (7, 18) and withheld ones are left out with a warning ("recording.noise").
+// Where the points break off there is a warning ("recording.damaged"). Throws InputError if there
+// is not one.
 void read_las_points(ByteSource& file, const LasHeader& header, Log& log,
                      const std::function<void(const LasPoint&)>& visit);
 

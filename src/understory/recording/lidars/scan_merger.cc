@@ -133,8 +133,10 @@ ScanPtr ScanMerger::cut(TimeNs end) {
     in_order = in_order && std::is_sorted(begin + middle, merged->points.end(), before);
     if (in_order) std::inplace_merge(begin, begin + middle, merged->points.end(), before);
     merged->ring_count += lidar.ring_count;
+    // A lidar that is covered sends scans without points, which tell no times.
     for (const ScanPtr& scan : lidar.scans)
-      merged->has_point_times = merged->has_point_times && scan->has_point_times;
+      merged->has_point_times =
+          merged->has_point_times && (scan->has_point_times || scan->points.empty());
     std::erase_if(lidar.scans, [&](const ScanPtr& scan) { return scan->end() < end; });
   }
   begin_ = end;

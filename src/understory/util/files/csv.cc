@@ -268,9 +268,18 @@ bool CsvReader::next() {
     if (content.empty() || content.front() == '#') continue;
     split_csv(line_, cells_, unquoted_);
     if (cells_.size() == names_.size()) return true;
-    if (cells_.size() > names_.size() && !format_.exact_width) return true;
-    const std::string problem = "expected " + std::to_string(names_.size()) + " cells, found " +
-                                std::to_string(cells_.size());
+    // A comma at the end of each row adds an empty cell.
+    const bool only_blank =
+        cells_.size() > names_.size() &&
+        std::all_of(cells_.begin() + static_cast<std::ptrdiff_t>(names_.size()), cells_.end(),
+                    [](std::string_view cell) { return trimmed(cell).empty(); });
+    if (only_blank && !format_.exact_width) return true;
+    std::string problem = "expected " + std::to_string(names_.size()) + " cells, found " +
+                          std::to_string(cells_.size());
+    if (cells_.size() > names_.size()) {
+      // More cells would be read into wrong columns.
+      fail(problem + ". Are there decimal commas? Decimals are written with a point");
+    }
     if (!format_.on_short_row) fail(problem);
     format_.on_short_row(problem);
   }

@@ -84,7 +84,7 @@ class LineReader {
 struct CsvFormat {
   bool any_case = false;           // names of columns are compared in lower case
   bool header_in_comment = false;  // a first line "# timestamp,gx,..." holds the names
-  bool exact_width = false;        // a row with more cells than names is refused, too
+  bool exact_width = false;        // a row with empty cells beyond the names is refused, too
   // Told of a row that has too few cells, which is then passed over; empty: InputError.
   std::function<void(const std::string& problem)> on_short_row = {};
   LineEdit edit = {};  // of every line, the header too; empty: none

@@ -72,6 +72,15 @@ TEST_F(Csv, SaysWhatIsWrongAndWhere) {
   EXPECT_NE(complaint([&] { (void)wide.next(); }).find("found 3"), std::string::npos);
 }
 
+// A regression: numbers with decimal commas were read into wrong columns.
+TEST_F(Csv, ARowThatIsLongerThanTheHeaderIsRefused) {
+  CsvReader commas(plain("id,x,y\nA,5,5,5,5\n"), {"x"});
+  EXPECT_NE(complaint([&] { (void)commas.next(); }).find("decimal commas"), std::string::npos);
+  CsvReader blank(plain("id,x,y\nA,5,5,\n"), {"x"});
+  ASSERT_TRUE(blank.next());
+  EXPECT_EQ(blank.number("y"), 5.0);
+}
+
 TEST_F(Csv, ATableThatWasCutShortIsNotItsEnd) {
   std::string text = "a\n";
   for (int i = 0; i < 100'000; ++i)

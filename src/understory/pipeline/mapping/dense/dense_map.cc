@@ -124,7 +124,8 @@ std::string DenseFrontEnd::why_no_map(const Recording& source) const {
   if (received_.counts.scans > 0) {
     return fmt::format(
         "none of its {} scans has points to map: {} points are not a number or at zero range. "
-        "The others are too near, too far or on the machine",
+        "The others are too near, too far or on the machine. `understory info` tells the ranges: "
+        "ranges of thousands are millimetres or centimetres, and points are expected in metres",
         received_.counts.scans, empty);
   }
   return "no lidar scan could be read from it" +
