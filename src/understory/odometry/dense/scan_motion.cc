@@ -1,5 +1,7 @@
 #include "understory/odometry/dense/scan_motion.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "understory/geometry/pose_io.h"
@@ -40,8 +42,10 @@ void ScanMotionWatch::add(const MatchTarget& target, const BodyCloud& source,
   const Pose guessed = guess.front().world_from_body.inverse() * guess.back().world_from_body;
   const Vector6d within = in_metres(guessed.log() + correction.at_end - correction.at_start);
   ++probes_;
-  products_ += within.dot(moved);
+  const double product = within.dot(moved);
+  products_ += product;
   squares_ += moved.squaredNorm();
+  along_ += product * product / moved.squaredNorm();
 }
 
 void ScanMotionWatch::move_world(const Pose& new_world_from_old_world) {
@@ -49,7 +53,11 @@ void ScanMotionWatch::move_world(const Pose& new_world_from_old_world) {
 }
 
 ScanMotion ScanMotionWatch::motion() const {
-  return {probes_, squares_ > 0.0 ? products_ / squares_ : 0.0};
+  if (!(squares_ > 0.0)) return {probes_, 0.0, 0.0};
+  const double ratio = products_ / squares_;
+  const double rest = std::max(0.0, along_ - ratio * products_);
+  const double sd = probes_ > 1 ? std::sqrt(rest / (squares_ * (probes_ - 1))) : 0.0;
+  return {probes_, ratio, sd};
 }
 
 void ScanMotionWatch::save(BinaryWriter& writer) const {
@@ -61,6 +69,7 @@ void ScanMotionWatch::save(BinaryWriter& writer) const {
   writer.put(probes_);
   writer.put(products_);
   writer.put(squares_);
+  writer.put(along_);
 }
 
 void ScanMotionWatch::load(BinaryReader& reader) {
@@ -73,6 +82,7 @@ void ScanMotionWatch::load(BinaryReader& reader) {
   probes_ = reader.get<int>();
   products_ = reader.get<double>();
   squares_ = reader.get<double>();
+  along_ = reader.get<double>();
 }
 
 }  // namespace understory

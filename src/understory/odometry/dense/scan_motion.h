@@ -17,6 +17,7 @@ namespace understory {
 struct ScanMotion {
   int probes = 0;
   double ratio = 0.0;  // by least squares over the probes; 0 before there is one
+  double sd = 0.0;     // its standard deviation, by how the probes differ; 0 before there are two
 };
 
 // Finds out from scans now and then, while the sensor moves. The first and the last pose of a scan
@@ -48,6 +49,7 @@ class ScanMotionWatch {
   int probes_ = 0;
   double products_ = 0.0;
   double squares_ = 0.0;
+  double along_ = 0.0;  // squares of the motions within scans, along those between
 };
 
 }  // namespace understory

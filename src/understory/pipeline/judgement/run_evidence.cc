@@ -55,6 +55,7 @@ void put_match(Figures& figures, const MatchEvidence& match) {
   figures["range_pairs"] = std::int64_t{match.range_pairs};
   figures["smear_m"] = match.smear_m;
   figures["scan_motion_ratio"] = match.scan_motion_ratio;
+  figures["scan_motion_sd"] = match.scan_motion_sd;
   figures["scan_motion_probes"] = std::int64_t{match.scan_motion_probes};
 }
 

@@ -72,6 +72,7 @@ struct MatchEvidence {
   double blur_growth = 1.0;
   // Motion within scans over motion between them, and on how many scans that rests; see ScanMotion.
   double scan_motion_ratio = 0.0;
+  double scan_motion_sd = 0.0;
   int scan_motion_probes = 0;
   // By how much all ranges seem to be too long, how sure that is, and how many pairs of views tell
   // it; see RangeCheck.

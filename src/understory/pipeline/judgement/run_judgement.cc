@@ -188,7 +188,10 @@ class Judge {
     const MatchEvidence& match = evidence_.match;
     if (match.scan_motion_probes < config_.min_scan_motion_probes) return;
     const double ratio = match.scan_motion_ratio;
-    if (ratio >= config_.min_scan_motion && ratio <= config_.max_scan_motion) return;
+    // A few probes that differ much tell nothing.
+    const double margin = kScanMotionSds * match.scan_motion_sd;
+    if (ratio + margin >= config_.min_scan_motion && ratio - margin <= config_.max_scan_motion)
+      return;
     const char* cause = "The times are wrong";
     if (ratio < -config_.min_scan_motion) {
       cause = "The times run backwards";

@@ -299,6 +299,12 @@ TEST(RunJudgement, TimesOfPoints) {
   expect_complete(evidence);
   evidence.match.scan_motion_ratio = limits.max_scan_motion;
   expect_complete(evidence);
+  // A regression: six probes that differed much called a right path wrong.
+  evidence.match.scan_motion_ratio = limits.min_scan_motion - 0.1;
+  evidence.match.scan_motion_sd = 0.06;
+  expect_complete(evidence);
+  evidence.match.scan_motion_sd = 0.04;
+  expect(RunStatus::kUntrusted, "too long", evidence);
 }
 
 TEST(RunJudgement, TimesOfPointsInNoOrder) {

@@ -38,6 +38,7 @@ void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const R
   evidence.accelerometer_bias_m_s2 = last.accel_bias.norm();
   const ScanMotion scan_motion = front_end.odometry().scan_motion();
   evidence.match.scan_motion_ratio = scan_motion.ratio;
+  evidence.match.scan_motion_sd = scan_motion.sd;
   evidence.match.scan_motion_probes = scan_motion.probes;
   const DenseCounts& counts = front_end.counts();
   MatchEvidence& match = evidence.match;
