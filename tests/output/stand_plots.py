@@ -115,7 +115,7 @@ def check_refusals(folder, cloud):
             (["--plots", "10,20,9"], 3, "none of the 1 overlaps"),
             (["--plots", geojson], 3, "names no coordinate system"),
             (["--plots", f"{EAST},{NORTH},9", "--slice"], 2, "--slice"),
-            (["--plot-grid", "-5"], 2, "stand.grid_m")]:
+            (["--plot-grid", "-5"], 2, "stand.grid_m"), (["--plot-grid", "0.001"], 2, "expected cells of 1 to 1000 m")]:
         run = folder / "refused"
         done = inventory(cloud, run, *words)
         assert done.returncode == code and message in done.stderr, (words, done.returncode, done.stderr)

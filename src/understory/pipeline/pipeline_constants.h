@@ -59,9 +59,12 @@ inline constexpr double kRangeM = 10.0;
 inline constexpr double kShareOfScatterWhenCleared = 0.5;
 // Share of the scans whose points have times in no order [chosen: no lidar gives one]
 inline constexpr double kMostMixedTimes = 0.05;
-// Standard deviations that the ratio of motions within and between scans has to be off [chosen:
-// random 4, 20 s, has 0.34 of six probes that differ much, and a path right to 2 mm]
-inline constexpr double kScanMotionSds = 2.0;
+// Standard deviations that the ratio of motions within and between scans has to be off [tuned:
+// random 4, 20 s, has 0.34 +- 0.14, and its path is right to 2 mm. Times that run backwards have
+// 0.24 +- 0.10 in 24 s]
+inline constexpr double kScanMotionSds = 1.0;
+// and how far that may widen the limits [bound: wrong times make probes differ, too]
+inline constexpr double kMostScanMotionMargin = 0.1;
 // degrees that a map leans at most, with kLargeBiasMPerS2: 1.7 m over 50 m [chosen]
 inline constexpr double kMostTiltDeg = 2.0;
 // m/s^2: an accelerometer that is off by more is not calibrated; good ones have 0.1 [data sheets]

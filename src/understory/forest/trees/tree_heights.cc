@@ -80,7 +80,8 @@ double TreeColumns::top(std::size_t stem, double slices_end_m, bool low_tops) co
   const double all = top_with_neighbours(stem, slices_end_m, low_tops);
   if (!(all > slices_end_m)) return all;
   const double own = core_end(stem, slices_end_m);
-  if (all - own <= kLeastOver || own <= kLeastSlenderness * 2.0 * stems_[stem].radius_m) return all;
+  const double least_over = std::max(kLeastOver, kLeastOverShare * all);
+  if (all - own <= least_over || own <= kLeastSlenderness * 2.0 * stems_[stem].radius_m) return all;
   const Column& column = columns_[stem];
   const int begin = decimetre_of(own), end = decimetre_of(all) + 1;
   const double points = points_within(column.decimetres, begin, end);

@@ -68,7 +68,7 @@ struct LasStream::Impl {
     constexpr laszip_U16 kWkt = 16;
     header->global_encoding = (options.gps_week_time ? 0 : kStandardGpsTime) | kWkt;
     std::strncpy(header->generating_software, options.generating_software.c_str(), 31);
-    std::strncpy(header->system_identifier, "SLAM", 31);
+    std::strncpy(header->system_identifier, "understory SLAM", 31);
     if (trees) add_columns();
     if (options.crs_wkt.empty()) return;
     check(laszip_add_vlr(

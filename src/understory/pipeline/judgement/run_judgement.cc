@@ -189,7 +189,7 @@ class Judge {
     if (match.scan_motion_probes < config_.min_scan_motion_probes) return;
     const double ratio = match.scan_motion_ratio;
     // A few probes that differ much tell nothing.
-    const double margin = kScanMotionSds * match.scan_motion_sd;
+    const double margin = std::min(kScanMotionSds * match.scan_motion_sd, kMostScanMotionMargin);
     if (ratio + margin >= config_.min_scan_motion && ratio - margin <= config_.max_scan_motion)
       return;
     const char* cause = "The times are wrong";

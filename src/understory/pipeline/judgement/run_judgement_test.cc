@@ -300,11 +300,15 @@ TEST(RunJudgement, TimesOfPoints) {
   evidence.match.scan_motion_ratio = limits.max_scan_motion;
   expect_complete(evidence);
   // A regression: six probes that differed much called a right path wrong.
-  evidence.match.scan_motion_ratio = limits.min_scan_motion - 0.1;
-  evidence.match.scan_motion_sd = 0.06;
+  evidence.match.scan_motion_ratio = limits.min_scan_motion - 0.06;
+  evidence.match.scan_motion_sd = 0.07;
   expect_complete(evidence);
-  evidence.match.scan_motion_sd = 0.04;
+  evidence.match.scan_motion_sd = 0.05;
   expect(RunStatus::kUntrusted, "too long", evidence);
+  // Nor do wrong times that make probes differ pass for right ones.
+  evidence.match.scan_motion_ratio = -0.5;
+  evidence.match.scan_motion_sd = 1.0;
+  expect(RunStatus::kUntrusted, "backwards", evidence);
 }
 
 TEST(RunJudgement, TimesOfPointsInNoOrder) {

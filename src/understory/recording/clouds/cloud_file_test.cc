@@ -369,6 +369,17 @@ TEST(CloudFile, LeavesOutNoiseAndWithheldPoints) {
   }
 }
 
+TEST(CloudFile, KeepsWhatThisProgramCallsNoise) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "cloud.las";
+  write_las(path, 1, false, [](laszip_point& point, int) { point.classification = 7; });
+  Bytes bytes = test::read_bytes(path);
+  const std::string name = "understory SLAM";
+  std::copy(name.begin(), name.end(), bytes.begin() + 26);
+  Log log;
+  EXPECT_EQ(read_cloud_bytes(bytes, log).points.size(), static_cast<std::size_t>(kCloudPoints));
+}
+
 // LASzip alone reads out of bounds on some of these.
 TEST(CloudFile, SurvivesFlippedBytesInLaz) {
   const test::TemporaryFolder folder;

@@ -15,6 +15,7 @@
 #include <istream>
 #include <memory>
 #include <streambuf>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -413,6 +414,10 @@ void read_fields(const std::vector<std::uint8_t>& raw, LasHeader& header) {
   const std::uint8_t format = get<std::uint8_t>(raw, 104);
   header.compressed = (format & 0xC0) != 0;
   header.point_format = format & 0x3F;
+  // LASzip writes itself as the generating software.
+  constexpr std::string_view kOwn = "understory";
+  constexpr std::ptrdiff_t kSystem = 26;
+  header.of_this_program = std::equal(kOwn.begin(), kOwn.end(), raw.begin() + kSystem);
   header.has_gps_time = has_time(header.point_format);
   header.gps_week_time = (get<std::uint16_t>(raw, 6) & 1U) == 0;
   header.record_length = get<std::uint16_t>(raw, 105);
@@ -462,7 +467,7 @@ void read_las_points(ByteSource& file, const LasHeader& header, Log& log,
   std::uint64_t left_out = 0;
   const auto visit_used = [&](const LasPoint& point) {
     const bool noise = point.classification == kLowNoise || point.classification == kHighNoise;
-    if (noise || point.withheld) {
+    if (!header.of_this_program && (noise || point.withheld)) {
       ++left_out;
     } else {
       visit(point);

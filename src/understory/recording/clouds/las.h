@@ -16,8 +16,9 @@ struct LasHeader {
   int point_format = 0;
   bool compressed = false;
   bool has_gps_time = false;
-  bool gps_week_time = false;  // times count from the beginning of a week
-  bool has_trees = false;      // points have tree_id and HeightAboveGround, see LasWriter
+  bool gps_week_time = false;    // times count from the beginning of a week
+  bool of_this_program = false;  // by its system identifier
+  bool has_trees = false;        // points have tree_id and HeightAboveGround, see LasWriter
   std::uint64_t points = 0;
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
@@ -45,8 +46,8 @@ struct LasPoint {
 
 // Calls `visit` for each point that may be used; memory does not depend on their number. Points of
 // the classes noise (7, 18) and withheld ones are left out with a warning ("recording.noise").
-// Where the points break off there is a warning ("recording.damaged"). Throws InputError if there
-// is not one.
+// Files of this program keep them: it finds its noise anew. Where the points break off there is a
+// warning ("recording.damaged"). Throws InputError if there is not one.
 void read_las_points(ByteSource& file, const LasHeader& header, Log& log,
                      const std::function<void(const LasPoint&)>& visit);
 
