@@ -125,7 +125,7 @@ double tilt_sd_deg(const GeoreferenceRequest& request, const MovableRun& run) {
 
 Eigen::Vector3d antenna_of(const GeoreferenceRequest& request, const MovableRun& run, Log& log) {
   const bool own = request.gnss.empty() && run.antenna_in_body.has_value();
-  const Eigen::Vector3d antenna = request.antenna_in_body.value_or(
+  Eigen::Vector3d antenna = request.antenna_in_body.value_or(
       own ? *run.antenna_in_body : Eigen::Vector3d(Eigen::Vector3d::Zero()));
   if (antenna.norm() > kLongestArmM)
     log.warn("recording.lever_arm",
