@@ -164,8 +164,7 @@ void add_satellite_options(CLI::App& command, GeoreferenceOptions& options) {
   command
       .add_option("--tilt-sd-deg", options.tilt_sd_deg,
                   "Standard deviation of the run's vertical about each axis (0.05 to 0.25 for a "
-                  "run with an "
-                  "IMU, 1 for one by stems, else 5)")
+                  "run with an IMU, 1 for one by stems, else 5)")
       ->check(CLI::Range(0.0, 45.0));
   command.add_flag("--plain", options.plain,
                    "Least squares without robust weights: fixes that are far off count fully");

@@ -56,7 +56,7 @@ class CellGrid {
   // enough, those with fewer than four times as many are, and so on.
   [[nodiscard]] Bounds bounds(std::uint64_t most, std::uint64_t few) const {
     Bounds all = bounds_of(0);
-    for (std::uint64_t least = few; cells_of(all) > most; least *= 4)
+    for (std::uint64_t least = std::max<std::uint64_t>(1, few); cells_of(all) > most; least *= 4)
       all = bounds_of(least);
     return all;
   }

@@ -32,14 +32,14 @@ inline constexpr int kBelowCore = 20;
 inline constexpr double kOvertopReach = 4.0;
 // Share of the neighbour's diameter that the tree's is below [tuned on the same: 0.7 to 1.2]
 inline constexpr double kThicker = 0.85;
-// Share of the points above the end of the axis that lie near it, where a crown of its own goes on,
-// at least [tuned on the same, 0.03 to 0.3, and on treels/pine_plot, where crowns of trees as high
-// as their neighbours have 0.13 and more]
+// Least share of the points above the end of the axis that lie near it, if the crown goes on
+// [tuned on the same, 0.03 to 0.3. On treels/pine_plot trees as high as their neighbours have 0.13
+// and more]
 inline constexpr double kOwnCrownShare = 0.1;
 // m that a neighbour reaches higher than the tree, at least ... [chosen: what a height errs by]
 inline constexpr double kLeastOver = 0.6;
-// ... and as a share of that height: the tops of high trees bend away from the axis of their foot
-// [tuned on the same and on spanner's MLS cloud, where one of 20 m bends by 0.8 m]
+// ... and as a share of that height. Tops of high trees bend away from the axis of their foot
+// [tuned on the same and on spanner's MLS cloud: a tree of 20 m bends by 0.8 m there]
 inline constexpr double kLeastOverShare = 0.08;
 // Height over diameter of a tree below its neighbours, at least. Forked and broad crowns have no
 // points at the axis: they would become stout [tuned on the same: 50 to 70; there 90 is usual]

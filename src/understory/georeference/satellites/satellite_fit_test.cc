@@ -456,5 +456,19 @@ TEST(SatellitePairs, TheWayOfTheAntennaIsNoError) {
   EXPECT_EQ(pair.mean().fixes, 10U);
 }
 
+TEST(SatellitePairs, AFixWithoutAHeightIsNotLeftOutForIt) {
+  GatheredPair pair;
+  for (int k = 0; k < 5; ++k) {
+    SatellitePair one;
+    one.time_s = 0.2 * k;
+    one.has_height = k != 2;
+    one.fix_in_enu = {0.1 * k, 0.0, one.has_height ? 150.0 : 0.0};
+    one.fixes = 1;
+    pair.add(one);
+  }
+  EXPECT_EQ(pair.mean().fixes, 5U);
+  EXPECT_FALSE(pair.mean().has_height);
+}
+
 }  // namespace
 }  // namespace understory

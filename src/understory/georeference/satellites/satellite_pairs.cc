@@ -114,7 +114,13 @@ std::vector<char> GatheredPair::left_out() const {
   if (singles_.size() < kFewestToCompare) return out;
   const auto fix_of = [](const SatellitePair& pair) { return pair.fix_in_enu; };
   const auto antenna_of = [](const SatellitePair& pair) { return pair.antenna_in_world; };
-  const Vector3d fix = median_place(singles_, fix_of);
+  Vector3d fix = median_place(singles_, fix_of);
+  // A fix without a height is not judged by it.
+  std::vector<double> heights;
+  for (const SatellitePair& one : singles_) {
+    if (one.has_height) heights.push_back(one.fix_in_enu.z());
+  }
+  if (!heights.empty()) fix.z() = median_of(std::move(heights));
   const Vector3d antenna = median_place(singles_, antenna_of);
   // Plane and height apart. The motion between both frames keeps lengths, so the way of the antenna
   // counts whichever way it went.
@@ -122,7 +128,7 @@ std::vector<char> GatheredPair::left_out() const {
   double moved = 0.0;
   for (const SatellitePair& one : singles_) {
     plane.push_back((one.fix_in_enu - fix).head<2>().norm());
-    height.push_back(std::abs(one.fix_in_enu.z() - fix.z()));
+    height.push_back(one.has_height ? std::abs(one.fix_in_enu.z() - fix.z()) : 0.0);
     moved = std::max(moved, (one.antenna_in_world - antenna).norm());
   }
   const double most_plane = moved + std::max(kFarFixM, kFarFixMedians * median_of(plane));
