@@ -85,9 +85,20 @@ TEST(TreeHeights, ATreeBelowANeighbourDoesNotBecomeStout) {
   EXPECT_NEAR(top_below_a_crown(0.075, 0.15, 0.45), 8.0, 0.1);
 }
 
-TEST(TreeHeights, FewPointsAtTheAxisDoNotEndATree) {
+TEST(TreeHeights, ACrownThatGoesOnAtTheAxisBehindAGapIsItsOwn) {
   std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0), stem_with_slope(2.0, 0.0)};
   stems[0].radius_m = 0.04;
+  stems[1].radius_m = 0.10;
+  TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
+  add_crown(columns, 0.0, 0.0, 1.0, 8.0);
+  add_crown(columns, 0.0, 0.0, 9.0, 15.0);
+  add_crown(columns, 0.8, 0.0, 7.0, 15.0);
+  EXPECT_NEAR(columns.top(0, 3.5), 15.0, 0.1);
+}
+
+TEST(TreeHeights, FewPointsAtTheAxisDoNotEndATree) {
+  std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0), stem_with_slope(2.0, 0.0)};
+  stems[0].radius_m = 0.03;
   stems[1].radius_m = 0.10;
   TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
   for (double height = 1.0; height <= 12.0; height += 0.9)  // as a sparse lidar shows them
