@@ -71,8 +71,8 @@ TEST(TreeHeights, AThinTreeEndsBelowTheCrownOfAThickerNeighbour) {
   EXPECT_NEAR(top_below_a_crown(0.04, 0.10, 0.45), 8.0, 0.1);
 }
 
-TEST(TreeHeights, ACrownAboveAThickTreeIsItsOwn) {
-  EXPECT_NEAR(top_below_a_crown(0.10, 0.10, 0.45), 15.0, 0.1);
+TEST(TreeHeights, ACrownAboveATreeAsThickAsItsNeighboursIsItsOwn) {
+  EXPECT_NEAR(top_below_a_crown(0.06, 0.06, 0.45), 15.0, 0.1);
 }
 
 TEST(TreeHeights, PointsAtTheAxisOfATreeAreItsOwn) {
@@ -94,6 +94,16 @@ TEST(TreeHeights, ACrownThatGoesOnAtTheAxisBehindAGapIsItsOwn) {
   add_crown(columns, 0.0, 0.0, 9.0, 15.0);
   add_crown(columns, 0.8, 0.0, 7.0, 15.0);
   EXPECT_NEAR(columns.top(0, 3.5), 15.0, 0.1);
+}
+
+TEST(TreeHeights, AHighTreeThatBendsKeepsItsTop) {
+  std::vector<StemFit> stems = {stem_with_slope(0.0, 0.0), stem_with_slope(3.0, 0.0)};
+  stems[0].radius_m = 0.15;
+  stems[1].radius_m = 0.25;
+  TreeColumns columns(stems, std::vector<double>(stems.size(), 0.0));
+  add_crown(columns, 0.0, 0.0, 1.0, 18.8);
+  add_crown(columns, 0.8, 0.0, 17.0, 20.0);
+  EXPECT_NEAR(columns.top(0, 3.5), 20.0, 0.1);
 }
 
 TEST(TreeHeights, FewPointsAtTheAxisDoNotEndATree) {
