@@ -443,6 +443,22 @@ TEST(SatelliteFit, ASingleFalseFixIsLeftOutWhereverItIs) {
   }
 }
 
+// Of a receiver with one fix a second nothing is compared within an interval.
+TEST(SatelliteFit, AFalseFixThatHasAnIntervalOfItsOwnDoesNotTellHowGoodTheFitIs) {
+  const std::vector<StampedPose> poses = walk();
+  SatelliteFitConfig config = usual_fit();
+  config.pairing.most_pairs = 10'000;
+  const SatelliteFit fit = fit_to_satellites(
+      poses, with_false_fixes(poses, 300, 600, [](GnssFix& fix) { fix.latitude_deg -= 10.0; }),
+      SatelliteMethod::kSplit, config, {});
+  ASSERT_TRUE(fit.found) << fit.reason;
+  EXPECT_LT(rms_error_m(fit, poses), 0.6);
+  EXPECT_LT(fit.plane_rms_m, 1.0);
+  EXPECT_GT(fit.all_plane_rms_m, 1'000.0);
+  EXPECT_GT(fit.left_out_share, 0.0);
+  EXPECT_FALSE(fit.fixes[300].used);
+}
+
 TEST(SatellitePairs, TheWayOfTheAntennaIsNoError) {
   GatheredPair pair;
   for (int k = 0; k < 10; ++k) {
