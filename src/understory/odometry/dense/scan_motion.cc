@@ -23,6 +23,36 @@ Vector6d in_metres(Vector6d motion) {
 
 }  // namespace
 
+void ScanMotionSums::add(const Vector6d& within, const Vector6d& between) {
+  const double product = within.dot(between);
+  ++probes_;
+  products_ += product;
+  squares_ += between.squaredNorm();
+  along_ += product * product / between.squaredNorm();
+}
+
+ScanMotion ScanMotionSums::motion() const {
+  if (probes_ == 0) return {};
+  const double ratio = products_ / squares_;
+  const double rest = std::max(0.0, along_ - ratio * products_);
+  const double sd = probes_ > 1 ? std::sqrt(rest / (squares_ * (probes_ - 1))) : 0.0;
+  return {probes_, ratio, sd};
+}
+
+void ScanMotionSums::save(BinaryWriter& writer) const {
+  writer.put(probes_);
+  writer.put(products_);
+  writer.put(squares_);
+  writer.put(along_);
+}
+
+void ScanMotionSums::load(BinaryReader& reader) {
+  probes_ = reader.get<int>();
+  products_ = reader.get<double>();
+  squares_ = reader.get<double>();
+  along_ = reader.get<double>();
+}
+
 void ScanMotionWatch::add(const MatchTarget& target, const BodyCloud& source,
                           const std::vector<StampedPose>& guess, const StampedPose& matched,
                           TimeNs duration) {
@@ -41,23 +71,11 @@ void ScanMotionWatch::add(const MatchTarget& target, const BodyCloud& source,
   if (correction.iterations == 0) return;
   const Pose guessed = guess.front().world_from_body.inverse() * guess.back().world_from_body;
   const Vector6d within = in_metres(guessed.log() + correction.at_end - correction.at_start);
-  ++probes_;
-  const double product = within.dot(moved);
-  products_ += product;
-  squares_ += moved.squaredNorm();
-  along_ += product * product / moved.squaredNorm();
+  sums_.add(within, moved);
 }
 
 void ScanMotionWatch::move_world(const Pose& new_world_from_old_world) {
   if (last_) last_->world_from_body = new_world_from_old_world * last_->world_from_body;
-}
-
-ScanMotion ScanMotionWatch::motion() const {
-  if (!(squares_ > 0.0)) return {probes_, 0.0, 0.0};
-  const double ratio = products_ / squares_;
-  const double rest = std::max(0.0, along_ - ratio * products_);
-  const double sd = probes_ > 1 ? std::sqrt(rest / (squares_ * (probes_ - 1))) : 0.0;
-  return {probes_, ratio, sd};
 }
 
 void ScanMotionWatch::save(BinaryWriter& writer) const {
@@ -66,10 +84,7 @@ void ScanMotionWatch::save(BinaryWriter& writer) const {
   writer.put(last.stamp);
   put_pose(writer, last.world_from_body);
   writer.put(since_probe_);
-  writer.put(probes_);
-  writer.put(products_);
-  writer.put(squares_);
-  writer.put(along_);
+  sums_.save(writer);
 }
 
 void ScanMotionWatch::load(BinaryReader& reader) {
@@ -79,10 +94,7 @@ void ScanMotionWatch::load(BinaryReader& reader) {
   last.world_from_body = get_pose(reader);
   last_ = any ? std::optional(last) : std::nullopt;
   since_probe_ = reader.get<int>();
-  probes_ = reader.get<int>();
-  products_ = reader.get<double>();
-  squares_ = reader.get<double>();
-  along_ = reader.get<double>();
+  sums_.load(reader);
 }
 
 }  // namespace understory

@@ -20,6 +20,23 @@ struct ScanMotion {
   double sd = 0.0;     // its standard deviation, by how the probes differ; 0 before there are two
 };
 
+// What the probes say together.
+class ScanMotionSums {
+ public:
+  // Motions in a scan's time, rotation (times a usual range) and shift, metres. `between` is not 0.
+  void add(const Vector6d& within, const Vector6d& between);
+  [[nodiscard]] ScanMotion motion() const;
+
+  void save(BinaryWriter& writer) const;
+  void load(BinaryReader& reader);
+
+ private:
+  int probes_ = 0;
+  double products_ = 0.0;
+  double squares_ = 0.0;
+  double along_ = 0.0;  // squares of the motions within scans, along those between
+};
+
 // Finds out from scans now and then, while the sensor moves. The first and the last pose of a scan
 // are matched each by itself (scan_path.h, hardly bound by what was guessed). The motion between
 // them is held against that since the scan before. Costs one such match every `kEvery` scans. Not
@@ -38,7 +55,7 @@ class ScanMotionWatch {
   void interrupt() { last_.reset(); }
   void move_world(const Pose& new_world_from_old_world);
 
-  [[nodiscard]] ScanMotion motion() const;
+  [[nodiscard]] ScanMotion motion() const { return sums_.motion(); }
 
   void save(BinaryWriter& writer) const;
   void load(BinaryReader& reader);
@@ -46,10 +63,7 @@ class ScanMotionWatch {
  private:
   std::optional<StampedPose> last_;  // of the scan before
   int since_probe_ = 0;
-  int probes_ = 0;
-  double products_ = 0.0;
-  double squares_ = 0.0;
-  double along_ = 0.0;  // squares of the motions within scans, along those between
+  ScanMotionSums sums_;
 };
 
 }  // namespace understory
