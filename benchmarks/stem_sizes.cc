@@ -152,9 +152,15 @@ void gather(LidarSensor sensor, const std::string& truth, const std::string& out
   }
 }
 
-void fit(const std::string& path) {
+struct FittedStem {
+  Kept kept;
+  StemFitResult fit;
+};
+
+std::vector<FittedStem> fitted_stems(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   const StemDetectorConfig config;
+  std::vector<FittedStem> stems;
   Kept kept;
   while (file.read(reinterpret_cast<char*>(&kept), sizeof kept)) {
     std::vector<SlicePoint> near(kept.points);
@@ -167,18 +173,30 @@ void fit(const std::string& path) {
     start.taper = kept.start[5];
     const StemFitResult first = fit_stem(near, start, config);
     if (!first.converged) continue;
-    const StemFitResult last = refine_stem(near, first, config);
-    if (!last.converged) continue;
+    StemFitResult last = refine_stem(near, first, config);
+    if (last.converged) stems.push_back({kept, std::move(last)});
+  }
+  return stems;
+}
+
+void fit(const std::string& path) {
+  const std::vector<FittedStem> stems = fitted_stems(path);
+  std::vector<StemScatter> scatters;
+  for (const auto& [kept, last] : stems)
+    scatters.push_back({kept.range_m, last.stem.radius_m, last.stem.scatter_m});
+  const double noise = range_noise_m(scatters);
+  for (const auto& [kept, last] : stems) {
     const StemFit& stem = last.stem;
     BeamConfig beams;
     beams.sensor = static_cast<LidarSensor>(kept.sensor);
-    const BeamFootprint beam = footprint_at(beams, kept.range_m);
+    BeamFootprint beam = footprint_at(beams, kept.range_m);
+    beam.noise_m = noise;
     const double excess = excess_radius_m(beam, stem.radius_m, stem.arc_deg, stem.scatter_m);
-    std::printf("%s,%d,%.3f,%.3f,%.5f,%.5f,%.5f,%.6f,%.1f,%d,%.5f,%.4f,%.5f,%.5f\n",
+    std::printf("%s,%d,%.3f,%.3f,%.5f,%.5f,%.5f,%.6f,%.1f,%d,%.5f,%.4f,%.5f,%.5f,%.5f\n",
                 std::filesystem::path(path).stem().c_str(), kept.sensor, kept.path_m, kept.range_m,
                 kept.true_dbh_m, 2.0 * stem.radius_m, 2.0 * excess, stem.spread_m, stem.arc_deg,
                 stem.returns, last.evidence.scatter_m, beam.signal > 0.0 ? 1.0 / beam.signal : 0.0,
-                beam.sd_m, excess_width_m(beam, stem.radius_m));
+                beam.sd_m, excess_width_m(beam, stem.radius_m), noise);
   }
 }
 
@@ -193,7 +211,7 @@ int main(int argc, char** argv) {
   } else if (mode == "fit") {
     std::printf(
         "cloud,sensor,path_m,range_m,true_m,dbh_m,excess_m,spread_m,arc_deg,returns,scatter_m,"
-        "weakness,beam_m,width_m\n");
+        "weakness,beam_m,width_m,noise_m\n");
     for (int i = 2; i < argc; ++i)
       fit(argv[i]);
   } else {

@@ -66,20 +66,22 @@ def fitted(terms, errors, groups):
 
 
 def fit_radius(rows):
-    """kOneSided, kAllSides and kScatter of excess_radius_m by robust least squares (Huber)."""
+    """kOneSided, kAllSides, kScatter and kNoise of excess_radius_m by robust least squares (Huber)."""
     rows = rows[(rows["beam_m"] > 0) & (np.abs(rows["dbh_m"] - rows["true_m"]) < 0.12)]
     radius = 0.5 * rows["dbh_m"]
-    terms = np.stack([np.maximum(0, 1 - rows["arc_deg"] / 360) * rows["width_m"], rows["beam_m"],
-                      -rows["beam_m"] * rows["scatter_m"] / np.maximum(radius, THIN_RADIUS)], 1)
+    one_sided = np.maximum(0, 1 - rows["arc_deg"] / 360)
+    noise = np.where(rows["noise_m"] > 0, rows["noise_m"], rows["scatter_m"])
+    terms = np.stack([one_sided * rows["width_m"], rows["beam_m"],
+                      -rows["beam_m"] * rows["scatter_m"] / np.maximum(radius, THIN_RADIUS), -one_sided * noise], 1)
     excess = radius - 0.5 * rows["true_m"]
     sds = np.sqrt((1.4 * rows["spread_m"]) ** 2 + 0.004 ** 2 + (1.5e-5 * rows["range_m"] ** 2) ** 2)
     _, cloud, number = np.unique(rows["cloud"], return_inverse=True, return_counts=True)
-    found = np.zeros(3)
+    found = np.zeros(4)
     for _ in range(30):
         ratio = np.abs(excess - terms @ found) / sds
         weights = np.sqrt(np.minimum(1, 1.5 / np.maximum(ratio, 1e-9)) / sds ** 2 / np.sqrt(number[cloud]))
         found = np.linalg.lstsq(terms * weights[:, None], excess * weights, rcond=None)[0]
-    print(f"excess_radius_m: kOneSided {found[0]:.2f}, kAllSides {found[1]:.2f}, kScatter {found[2]:.2f}, from {len(rows)} stems")
+    print(f"excess_radius_m: kOneSided {found[0]:.2f}, kAllSides {found[1]:.2f}, kScatter {found[2]:.2f}, kNoise {found[3]:.2f}, from {len(rows)} stems")
 
 
 def tell(kind, rows, fit):

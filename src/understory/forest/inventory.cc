@@ -64,12 +64,19 @@ std::vector<Tree> trees_of(const InventoryResult& result, const std::vector<doub
 // Takes away what wide beams add to the radii, and says how sure these are.
 void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3d>& scanner,
                       InventoryResult& result) {
-  for (StemFit& stem : result.stems) {
+  std::vector<StemScatter> scatters;
+  for (const StemFit& stem : result.stems) {
     Eigen::Vector3d place = result.origin;
     place.head<2>() += stem.centre;
     place.z() = result.ground.terrain.interpolate(place.x(), place.y()) + kBreastHeight;
-    const double range = mean_range_to(scanner, place);
+    scatters.push_back({mean_range_to(scanner, place), stem.radius_m, stem.scatter_m});
+  }
+  const double noise = range_noise_m(scatters);
+  for (std::size_t i = 0; i < result.stems.size(); ++i) {
+    StemFit& stem = result.stems[i];
+    const double range = scatters[i].range_m;
     stem.beam = footprint_at(config, range);
+    stem.beam.noise_m = noise;
     stem.beam_excess_m = excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg, stem.scatter_m);
     stem.radius_m -= stem.beam_excess_m;
     const double sd = diameter_sd_m(stem.spread_m, stem.arc_deg, range, stem.beam);
