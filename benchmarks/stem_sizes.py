@@ -17,7 +17,7 @@ DISTANCES = [(0, 4), (4, 8), (8, 15), (15, 22), (22, 30)]
 SIZES = [(0.05, 0.10), (0.10, 0.20), (0.20, 9.0)]
 FEWEST = 30
 THIN_RADIUS = 0.03  # m: kThinRadius
-# As in src/understory/forest/stem_constants.h, namespace beam_footprint; metres.
+# As in src/understory/forest/beam_constants.h; metres.
 CONSTANTS = {"known": [2.3, 0.0057, 0.0023, 0.0074], "wide": [2.6, 0.0049, 0.0043, 0.018], "bare": [6.0, 0.003, 0.024]}
 
 

@@ -1,8 +1,11 @@
 """Machines with two lidars: merged by the whole program, whatever happens to one of them, and what is said then."""
 
+import array
 import json
 
+from mcap.reader import make_reader
 from program import Cases, map_recording, program
+from recordings import Message, edit_cloud, write_mcap
 
 cases = Cases()
 SMALL = ["stand.size_x_m=60", "stand.size_y_m=60", "gnss.enabled=false", "carrier.length_m=30"]
@@ -10,10 +13,10 @@ SECONDS = 12
 BOTH = ("--lidar-topic", "/lidar,/lidar_2")
 
 
-def simulated(name, *settings):
+def simulated(name, *settings, seconds=SECONDS):
     path = cases.folder / name
     words = [word for setting in [*SMALL, *settings] for word in ("--set", setting)]
-    done = program("simulate", "harvester2", "-o", path, "--seed", 5, "--duration-s", SECONDS, *words)
+    done = program("simulate", "harvester2", "-o", path, "--seed", 5, "--duration-s", seconds, *words)
     assert done.returncode == 0, done.stderr
     return path
 
@@ -82,6 +85,45 @@ def late(folder):
     assert "5.0 s after the first lidar" in warning["message"] or "5.1 s" in warning["message"], warning
     info = info_of(recording, *BOTH)
     assert info["lidar"]["points"] == points_of(info, "/lidar") + points_of(info, "/lidar_2")
+    return warning["message"]
+
+
+@cases.case("clocks that differ are told: by 20 ms in a warning, by 0.1 s the run is untrusted")
+def differing_clocks(folder):
+    assert not {"lidars.clock", "lidars.place"} & set(map_recording(WALK, folder / "right", *BOTH).warnings)
+    said = []
+    for late_s, status in ((0.02, "complete"), (0.1, "untrusted")):
+        recording = simulated(f"late{late_s}.mcap", f"second_lidar.time_offset_s={late_s}", "stand.size_x_m=100",
+                              "stand.size_y_m=100", "carrier.length_m=60", seconds=25)
+        outcome = map_recording(recording, folder / f"run{late_s}", *BOTH)
+        assert outcome.run["status"] == status, (late_s, outcome.run["status"], outcome.said)
+        warning = outcome.warnings["lidars.clock"]["message"]
+        assert "the clock of lidar 2 seems to be" in warning and "ms late" in warning, warning
+        assert abs(outcome.run["evidence"]["further_lidar_late_s"] / late_s - 1) < 0.4, outcome.run["evidence"]
+        said.append(warning)
+    assert "beside those of the first one" in outcome.said, outcome.said
+    return said[0]
+
+
+@cases.case("one whose points are in millimetres is named: partial")
+def millimetres(folder):
+    def scale(cloud):
+        values = array.array("f", bytes(cloud.points))
+        for name in ("x", "y", "z"):
+            each = slice(cloud.fields[name][0] // 4, None, cloud.step // 4)
+            values[each] = array.array("f", [1000 * value for value in values[each]])
+        cloud.points = bytearray(values.tobytes())
+
+    spoilt = folder / "mm.mcap"
+    with open(WALK, "rb") as file:
+        messages = [Message(channel.topic, schema.name, message.log_time, message.data)
+                    for schema, channel, message in make_reader(file).iter_messages()]
+    write_mcap(spoilt, [edit_cloud(m, scale) if m.topic == "/lidar_2" else m for m in messages])
+    outcome = map_recording(spoilt, folder / "run", *BOTH)
+    assert outcome.code == 4 and outcome.run["status"] == "partial", (outcome.code, outcome.run["status"])
+    warning = outcome.warnings["recording.silent_lidar"]
+    assert warning["count"] == 1 and "/lidar_2" in warning["message"], warning
+    assert "millimetres" in warning["message"], warning
     return warning["message"]
 
 

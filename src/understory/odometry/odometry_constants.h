@@ -119,6 +119,29 @@ inline constexpr double kLeastMotionM = 0.08;
 inline constexpr double kLongestStepS = 0.5;
 }  // namespace scan_motion
 
+namespace lidar_agreement {  // odometry/dense/lidar_agreement.cc
+// m/s: slower motion tells nothing of clocks [chosen]
+inline constexpr double kLeastSpeed = 0.2;
+// s between two scans: more is no even motion [chosen]
+inline constexpr double kLongestEvenStepS = 0.5;
+// Scans at least that tell where a lidar's points lie [chosen]
+inline constexpr int kFewestProbes = 8;
+// Components of a motion [bound: turn and shift]
+inline constexpr double kComponents = 6.0;
+// Values that are estimated from these [bound: a constant each, and one clock]
+inline constexpr double kParameters = 7.0;
+// s: a clock that is off by less is not told [chosen: as that of the IMU]
+inline constexpr double kLeastLateS = 0.005;
+// m: points that lie apart by less are not told [chosen: 5 standard deviations of good recordings
+// of harvester2]
+inline constexpr double kLeastMisplacedM = 0.015;
+// Standard deviations of a clock that are sure [chosen: as for the IMU's clock]
+inline constexpr double kSureClockSds = 4.0;
+// The same of the points' place, whose standard deviation is that of six components together
+// [chosen: chance alone does not reach it]
+inline constexpr double kSurePlaceSds = 3.0;
+}  // namespace lidar_agreement
+
 namespace dense_odometry {  // odometry/dense/dense_odometry.cc
 // Of the accelerations that the motion model allows for between scans: a path that may bend more
 // within one follows the noise of sparse scans [chosen]

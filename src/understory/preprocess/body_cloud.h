@@ -38,5 +38,8 @@ struct BodyCloud {
 // Which lidar of several measured each point, by its ring (kRingsALidar); empty where it was the
 // first one always.
 [[nodiscard]] std::vector<std::uint8_t> lidars_of(const std::vector<std::uint16_t>& rings);
+// The same cloud in parts, by the lidar that measured the points; its features and what is carried
+// go along.
+[[nodiscard]] std::vector<BodyCloud> clouds_by_lidar(const BodyCloud& cloud);
 
 }  // namespace understory

@@ -107,6 +107,11 @@ inline constexpr std::int64_t kSilence = 1'000'000'000;
 inline constexpr std::int64_t kJump = 10'000'000'000;
 // Events of other sensors that wait for a scan at most [chosen: seconds of any IMU]
 inline constexpr std::size_t kMostWaiting = 5'000;
+// Points at least by which the ranges of a lidar are told [chosen]
+inline constexpr std::size_t kFewestRanges = 10;
+// m: half of the points of a lidar are nearer [chosen: no forest is looked at from so far away; in
+// centimetres half of the points are beyond]
+inline constexpr float kFarthestMedianM = 300.0F;
 // Lidars in one scan [bound: their rings are counted by 16 bits]
 inline constexpr std::size_t kMostLidars = 16;
 }  // namespace merged_lidars

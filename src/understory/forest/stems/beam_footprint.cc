@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "understory/forest/stem_constants.h"
+#include "understory/forest/beam_constants.h"
 #include "understory/util/median.h"
 
 namespace understory {
 namespace {
 
-using namespace stem_constants::beam_footprint;
+using namespace beam_constants;
 
 // The beams of a sensor by its data sheet, as in simulated recordings.
 BeamConfig beams_of(LidarSensor sensor) {

@@ -106,6 +106,7 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& loc
     const bool by_match = local_map && !known.pose;
     if (by_match) match(*local_map, motion_->predict(scan.stamp), known.terms, estimate);
     watch_scan_motion(scan, local_map, guess, estimate);
+    watch_lidars(scan, local_map, estimate);
     if (config_.elastic_scans && estimate.matched && by_scans_alone())
       match_elastically(scan, *local_map, guess, estimate);
     std::optional<LidarFactor> factor;
@@ -250,6 +251,24 @@ void DenseOdometry::watch_scan_motion(const Scan& scan, const MatchTargetPtr& lo
                    {scan.stamp, estimate.match.target_from_source}, estimate.scan_end - scan.stamp);
 }
 
+void DenseOdometry::watch_lidars(const Scan& scan, const MatchTargetPtr& local_map,
+                                 const DenseEstimate& estimate) {
+  if (rig_.further_lidars.empty() || estimate.tops) return;
+  if (!estimate.matched) return agreement_.interrupt();
+  const Pose& matched = estimate.match.target_from_source;
+  if (!agreement_.wants({scan.stamp, matched})) return;
+  const ScopedTimer timer(times_, "lidar_agreement");
+  std::vector<std::optional<Pose>> poses;
+  for (const BodyCloud& own : clouds_by_lidar(estimate.thinned)) {
+    const RegistrationResult match =
+        own.empty() ? RegistrationResult()
+                    : match_cloud(*local_map, own, matched, {}, MatchStart::kNear);
+    const bool found = match.usable() && match.inlier_ratio >= config_.match.min_inlier_ratio;
+    poses.push_back(found ? std::optional(match.target_from_source) : std::nullopt);
+  }
+  agreement_.add(poses);
+}
+
 void DenseOdometry::match_elastically(const Scan& scan, const MatchTarget& target,
                                       const std::vector<StampedPose>& guess,
                                       DenseEstimate& estimate) {
@@ -331,6 +350,7 @@ void DenseOdometry::move_world(const Pose& new_world_from_old_world) {
   motion_->move_world(new_world_from_old_world);
   weather_.move_world(new_world_from_old_world);
   scan_motion_.move_world(new_world_from_old_world);
+  agreement_.move_world(new_world_from_old_world);
 }
 
 void DenseOdometry::save(BinaryWriter& writer) const {
@@ -340,6 +360,7 @@ void DenseOdometry::save(BinaryWriter& writer) const {
   writer.put(lidars_);
   writer.put(last_scan_);
   scan_motion_.save(writer);
+  agreement_.save(writer);
   motion_->save(writer);
   carried_.save(writer);
   weather_.save(writer);
@@ -352,6 +373,7 @@ void DenseOdometry::load(BinaryReader& reader) {
   lidars_ = reader.get<std::uint64_t>();
   last_scan_ = reader.get<TimeNs>();
   scan_motion_.load(reader);
+  agreement_.load(reader);
   motion_->load(reader);
   carried_.load(reader);
   weather_.load(reader);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/odometry/dense/lidar_agreement.h"
 #include "understory/odometry/dense/scan_motion.h"
 #include "understory/odometry/dense/scan_path.h"
 #include "understory/odometry/dense/scan_tops.h"
@@ -142,6 +143,8 @@ class DenseOdometry {
   [[nodiscard]] TimeNs last_scan() const { return last_scan_; }
   // Whether the times of the points fit the motion from scan to scan.
   [[nodiscard]] ScanMotion scan_motion() const { return scan_motion_.motion(); }
+  // Which further lidar lies farthest off the first one, once enough scans have told.
+  [[nodiscard]] std::optional<LidarOffset> lidar_offset() const { return agreement_.worst(); }
   void save(BinaryWriter& writer) const;
   void load(BinaryReader& reader);
 
@@ -159,6 +162,9 @@ class DenseOdometry {
                          const std::vector<StampedPose>& guess, DenseEstimate& estimate);
   void watch_scan_motion(const Scan& scan, const MatchTargetPtr& local_map,
                          const std::vector<StampedPose>& guess, const DenseEstimate& estimate);
+  // Matches the points of each lidar by themselves, now and then.
+  void watch_lidars(const Scan& scan, const MatchTargetPtr& local_map,
+                    const DenseEstimate& estimate);
   // Learns which of the scan's points are carried along.
   void learn_carried(const Scan& scan, const std::vector<StampedPose>& path);
   // A lidar that joins sees what is not in the map yet: what was found before says nothing then.
@@ -183,6 +189,7 @@ class DenseOdometry {
   TimeNs last_scan_ = 0;            // stamp
   std::vector<std::uint8_t> keep_;  // workspace: points of the scan outside the machine
   ScanMotionWatch scan_motion_;
+  LidarAgreement agreement_;
   double usual_inliers_ = 0.0;   // running mean of the inlier ratio of matches; 0: none yet
   double usual_residual_ = 0.0;  // the same of their distance from the map's surfaces, m
   std::uint64_t lidars_ = 0;     // that have given points, a bit each

@@ -16,12 +16,12 @@ using namespace odometry_constants::scan_motion;
 // So loose that the guess hardly binds: what is looked for is a guess that is wrong.
 constexpr ScanPathConfig kLoose{30.0, 60.0, 8, 6.0};
 
-Vector6d in_metres(Vector6d motion) {
+}  // namespace
+
+Vector6d motion_in_metres(Vector6d motion) {
   motion.head<3>() *= kRangeM;
   return motion;
 }
-
-}  // namespace
 
 void ScanMotionSums::add(const Vector6d& within, const Vector6d& between) {
   const double product = within.dot(between);
@@ -62,15 +62,15 @@ void ScanMotionWatch::add(const MatchTarget& target, const BodyCloud& source,
   const double between = to_seconds(matched.stamp - before->stamp);
   if (between <= 0.0 || between > kLongestStepS) return;
   const Vector6d moved =
-      in_metres((before->world_from_body.inverse() * matched.world_from_body).log() *
-                (to_seconds(duration) / between));
+      motion_in_metres((before->world_from_body.inverse() * matched.world_from_body).log() *
+                       (to_seconds(duration) / between));
   if (moved.norm() < kLeastMotionM) return;
   since_probe_ = 0;
   const ScanPathCorrection correction =
       match_scan_path(target, source, duration, matched.world_from_body, kLoose);
   if (correction.iterations == 0) return;
   const Pose guessed = guess.front().world_from_body.inverse() * guess.back().world_from_body;
-  const Vector6d within = in_metres(guessed.log() + correction.at_end - correction.at_start);
+  const Vector6d within = motion_in_metres(guessed.log() + correction.at_end - correction.at_start);
   sums_.add(within, moved);
 }
 

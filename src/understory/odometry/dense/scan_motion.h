@@ -20,6 +20,9 @@ struct ScanMotion {
   double sd = 0.0;     // its standard deviation, by how the probes differ; 0 before there are two
 };
 
+// A motion in metres: its rotation by what it moves at a usual range, 10 m.
+[[nodiscard]] Vector6d motion_in_metres(Vector6d motion);
+
 // What the probes say together.
 class ScanMotionSums {
  public:

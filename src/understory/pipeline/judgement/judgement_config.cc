@@ -49,6 +49,8 @@ void describe(ConfigTable& table, JudgementConfig& config) {
             "untrusted: the lidar was silent for longer");
   table.add("max_smear_m", config.max_smear_m, {0.0, 100.0}, "m",
             "untrusted: points have no times and are smeared by more, 10 m away");
+  table.add("max_lidars_apart_m", config.max_lidars_apart_m, {0.0, 100.0}, "m",
+            "untrusted: the points of one lidar lie by more beside those of the first one");
   table.add("max_repeated", config.max_repeated, shares, "",
             "untrusted: a larger share of the scans holds the same points as the scan before");
   table.add("max_misplaced", config.max_misplaced, shares, "",

@@ -19,7 +19,8 @@ struct JudgementConfig {
   double max_blur_growth = 1.15;
   double longest_lidar_gap_s = 1.0;
   double max_smear_m = 0.05;
-  double max_repeated = 0.01;  // share of the scans; no lidar sees the same twice
+  double max_lidars_apart_m = 0.05;  // one of several beside the first one, see LidarOffset
+  double max_repeated = 0.01;        // share of the scans; no lidar sees the same twice
   // Share of the steps, see MotionLimits. A scan at a wrong place makes two or three such steps.
   // Beyond the first share the run is partial; beyond the second, or where the times of the scans
   // were assumed, it is untrusted.

@@ -59,6 +59,16 @@ void put_match(Figures& figures, const MatchEvidence& match) {
   figures["scan_motion_probes"] = std::int64_t{match.scan_motion_probes};
 }
 
+void put_further_lidar(Figures& figures, const FurtherLidarEvidence& lidar) {
+  if (lidar.number == 0) return;
+  figures["further_lidar"] = std::int64_t{lidar.number};
+  figures["further_lidar_apart_m"] = lidar.apart_m;
+  figures["further_lidar_late_s"] = lidar.late_s;
+  figures["further_lidar_late_sd_s"] = lidar.late_sd_s;
+  figures["further_lidar_misplaced_m"] = lidar.misplaced_m;
+  figures["further_lidar_misplaced_sd_m"] = lidar.misplaced_sd_m;
+}
+
 void put_stems(Figures& figures, const StemRunEvidence& stems) {
   put(figures, "views", stems.views);
   put(figures, "views_doubtful", stems.doubtful);
@@ -98,6 +108,7 @@ Figures figures_of(const RunEvidence& evidence) {
   figures["imu_motion_windows"] = std::int64_t{evidence.imu_motion_windows};
   put_motion(figures, evidence.motion);
   put_match(figures, evidence.match);
+  put_further_lidar(figures, evidence.further_lidar);
   if (!evidence.by_stems) put_stand(figures, evidence.stand);
   if (evidence.by_stems) put_stems(figures, evidence.stems);
   return figures;

@@ -82,6 +82,17 @@ struct MatchEvidence {
   double smear_m = 0.0;  // how far a point 10 m away moves during a scan, on average
 };
 
+// The one of several lidars whose points lie farthest off those of the first one, see LidarOffset.
+// All zero with one lidar, and before enough scans have told.
+struct FurtherLidarEvidence {
+  int number = 0;        // 2: the second one
+  double apart_m = 0.0;  // from the points of the first one
+  double late_s = 0.0;   // of its clock
+  double late_sd_s = 0.0;
+  double misplaced_m = 0.0;  // its place on the body
+  double misplaced_sd_m = 0.0;
+};
+
 // By stems: how views fitted each other. All zero for the dense front end.
 struct StemRunEvidence {
   std::uint64_t views = 0;
@@ -126,6 +137,7 @@ struct RunEvidence {
   bool point_times_missing = false;  // of a lidar that spins
   std::string why_no_point_times;
   std::uint64_t mixed_times = 0;  // scans whose points have times in no order
+  FurtherLidarEvidence further_lidar;
   bool imu_used = false;          // at the end
   bool imu_on_probation = false;  // at the end: left out until it is clear whether it is right
   double imu_doubted_s = 0.0;     // left out for so long, and used again

@@ -37,6 +37,7 @@ class Judge {
     judge_damage();
     judge_times();
     judge_scan_motion();
+    judge_further_lidar();
     judge_imu();
     judge_scale();
     judge_ranges();
@@ -202,6 +203,16 @@ class Judge {
         "the times of points do not fit the motion: within scans the sensor moves {:.1f} "
         "times as far as from scan to scan. {}",
         ratio, cause));
+  }
+
+  // Whether several lidars see the same things in the same places.
+  void judge_further_lidar() {
+    const FurtherLidarEvidence& lidar = evidence_.further_lidar;
+    if (lidar.apart_m <= config_.max_lidars_apart_m) return;
+    hurt(
+        fmt::format("the points of lidar {} lie {:.0f} cm beside those of the first one: its "
+                    "clock or its extrinsics are wrong",
+                    lidar.number, 100.0 * lidar.apart_m));
   }
 
   // Standard deviation of the scale, from the scatter of the accelerations about it.

@@ -311,6 +311,18 @@ TEST(RunJudgement, TimesOfPoints) {
   expect(RunStatus::kUntrusted, "backwards", evidence);
 }
 
+TEST(RunJudgement, LidarsThatSeeTheSameElsewhereAreUntrusted) {
+  RunEvidence evidence = good_run();
+  const double limit = JudgementConfig().max_lidars_apart_m;
+  evidence.further_lidar = {2, limit, 0.03, 0.001, 0.0, 0.01};
+  expect_complete(evidence);
+  evidence.further_lidar.apart_m = limit + 0.03;
+  expect(RunStatus::kUntrusted, "the points of lidar 2 lie 8 cm beside those of the first one",
+         evidence);
+  EXPECT_EQ(figures_of(evidence).count("further_lidar_late_s"), 1U);
+  EXPECT_EQ(figures_of(good_run()).count("further_lidar_late_s"), 0U);
+}
+
 TEST(RunJudgement, TimesOfPointsInNoOrder) {
   RunEvidence evidence = good_run();
   evidence.mixed_times = 50;

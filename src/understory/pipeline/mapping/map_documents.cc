@@ -57,4 +57,22 @@ void tell_imu_clock(const std::optional<ClockCheckResult>& check, Log& log, RunS
                          turned_deg, turned_sd_deg, kRemedy));
 }
 
+void tell_lidar_offset(const LidarOffset& offset, Log& log) {
+  if (offset.clock_is_off())
+    log.warn("lidars.clock",
+             fmt::format("the clock of lidar {} seems to be {:.0f} ± {:.0f} ms {} by that of the "
+                         "first one: `understory calibrate lidars` finds it, and `map "
+                         "--extrinsics` takes it out",
+                         offset.lidar + 1, 1e3 * std::abs(offset.late_s), 1e3 * offset.late_sd_s,
+                         offset.late_s > 0.0 ? "late" : "early"));
+  // A clock that is off also seems to move the place.
+  if (offset.place_is_off() && !offset.clock_is_off())
+    log.warn(
+        "lidars.place",
+        fmt::format("the points of lidar {} lie {:.1f} ± {:.1f} cm beside those of the first "
+                    "one, however the machine moves: extrinsics are wrong by several times as "
+                    "much",
+                    offset.lidar + 1, 100.0 * offset.misplaced_m, 100.0 * offset.misplaced_sd_m));
+}
+
 }  // namespace understory

@@ -8,6 +8,7 @@
 #include "understory/georeference/satellites/satellite_belief.h"
 #include "understory/map/keyframes/returning_keyframes.h"
 #include "understory/map/loop_closer.h"
+#include "understory/odometry/dense/lidar_agreement.h"
 #include "understory/odometry/dense/recovery.h"
 #include "understory/odometry/imu/imu_watch.h"
 #include "understory/pipeline/judgement/imu_usage.h"
@@ -36,7 +37,7 @@ std::size_t size_of(const Put& put) {
 // was begun before would have been read as another one. Where this fails, kCheckpointFormat grows
 // by one, and the sizes here become the new ones.
 TEST(CheckpointFormat, GrowsWithWhatIsKept) {
-  EXPECT_EQ(kCheckpointFormat, 17);
+  EXPECT_EQ(kCheckpointFormat, 18);
   Log log;
   const auto saved = [](const auto& part) {
     return size_of([&](BinaryWriter& writer) { part.save(writer); });
@@ -44,6 +45,8 @@ TEST(CheckpointFormat, GrowsWithWhatIsKept) {
   EXPECT_EQ(saved(EventOrderer(EventOrderer::Config(), log)), 1142U);
   EXPECT_EQ(saved(ImuWatch(9.81, nullptr)), 613U);
   EXPECT_EQ(saved(ImuUsage()), 25U);
+  EXPECT_EQ(saved(LidarAgreement()), 77U);
+  EXPECT_EQ(saved(LidarOffsetSums()), 244U);
   EXPECT_EQ(saved(LidarImuClockCheck()), 41U);
   EXPECT_EQ(saved(OnlineImuCalibration()), 569U);
   EXPECT_EQ(size_of([](BinaryWriter& writer) { put_conditions(writer, {}); }), 24U);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <deque>
 #include <iterator>
 #include <map>
@@ -17,6 +18,7 @@
 #include "understory/recording/messages/event_bytes.h"
 #include "understory/recording/recording_constants.h"
 #include "understory/util/error.h"
+#include "understory/util/median.h"
 
 namespace understory {
 namespace {
@@ -33,6 +35,7 @@ struct ReadLidar {
   bool left_out = false;  // its place is not known
   bool told = false;      // that it died
   bool beginning_told = false;
+  bool ranges_seen = false;                 // a scan told how far its points lie
   std::map<std::string, std::size_t> said;  // warnings of its own log that were passed on
 };
 
@@ -118,7 +121,8 @@ class MergedLidars : public Recording {
       writer.put(lidar.first.value_or(0));
       writer.put(lidar.first.has_value());
       writer.put(lidar.end);
-      for (const bool flag : {lidar.ended, lidar.left_out, lidar.told, lidar.beginning_told})
+      for (const bool flag :
+           {lidar.ended, lidar.left_out, lidar.told, lidar.beginning_told, lidar.ranges_seen})
         writer.put(flag);
     }
     merger_.save(writer);
@@ -140,7 +144,8 @@ class MergedLidars : public Recording {
       const auto first = reader.get<TimeNs>();
       if (reader.get<bool>()) lidar.first = first;
       lidar.end = reader.get<TimeNs>();
-      for (bool* flag : {&lidar.ended, &lidar.left_out, &lidar.told, &lidar.beginning_told})
+      for (bool* flag :
+           {&lidar.ended, &lidar.left_out, &lidar.told, &lidar.beginning_told, &lidar.ranges_seen})
         *flag = reader.get<bool>();
     }
     merger_.load(reader);
@@ -260,9 +265,26 @@ class MergedLidars : public Recording {
                         file_, lidar.reader.topic, format_seconds(lidar.end),
                         format_seconds(certain->stamp), to_seconds(certain->stamp - lidar.end)));
       }
+      look_at_ranges(lidar, *certain);
       lidar.end = std::max(lidar.end, certain->end());
       merger_.add(number, std::move(certain));
     }
+  }
+
+  // Points in a wrong unit are all too far to be mapped: the others go on without them.
+  void look_at_ranges(ReadLidar& lidar, const Scan& scan) {
+    if (lidar.ranges_seen || scan.points.size() < kFewestRanges) return;
+    lidar.ranges_seen = true;
+    std::vector<float> ranges;
+    for (const ScanPoint& point : scan.points)
+      ranges.push_back(std::hypot(point.x, point.y, point.z));
+    const float median = upper_median(std::move(ranges));
+    if (median < kFarthestMedianM) return;
+    report_finding(
+        log_, Finding::kSilentLidar,
+        fmt::format("{}: half of the points of {} lie over {:.0f} m away. Are its coordinates in "
+                    "millimetres or centimetres? Points are expected in metres",
+                    file_, lidar.reader.topic, median));
   }
 
   void end(std::size_t number) {

@@ -183,6 +183,21 @@ TEST(MergedLidars, OneThatDiesLeavesTheOtherAndIsNamedWithTheTime) {
   }
 }
 
+// Its points are read, but none of them lies where a map is made.
+TEST(MergedLidars, OneInMillimetresIsNamedOnce) {
+  for (std::size_t far = 0; far < 2; ++far) {
+    std::vector<LidarPlan> plans = two_plans();
+    plans[1].period = plans[0].period;
+    plans[far].x_m = 7'000.0;
+    plans[1 - far].x_m = 90.0;
+    Log log;
+    (void)read_lidars(*merged(plans, log));
+    const Found silent = found(log, Finding::kSilentLidar);
+    EXPECT_EQ(silent.count, 1U) << far;
+    EXPECT_NE(silent.first.find(plans[far].topic + " lie over 7000 m away"), std::string::npos);
+  }
+}
+
 TEST(MergedLidars, OneThatIsSilentForAWhileComesBack) {
   for (std::size_t silent = 0; silent < 2; ++silent) {
     std::vector<LidarPlan> plans = two_plans();

@@ -40,6 +40,14 @@ void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const R
   evidence.match.scan_motion_ratio = scan_motion.ratio;
   evidence.match.scan_motion_sd = scan_motion.sd;
   evidence.match.scan_motion_probes = scan_motion.probes;
+  if (const auto offset = front_end.odometry().lidar_offset()) {
+    evidence.further_lidar = {static_cast<int>(offset->lidar) + 1,
+                              offset->apart_m,
+                              offset->late_s,
+                              offset->late_sd_s,
+                              offset->misplaced_m,
+                              offset->misplaced_sd_m};
+  }
   const DenseCounts& counts = front_end.counts();
   MatchEvidence& match = evidence.match;
   match.scans = counts.scans;

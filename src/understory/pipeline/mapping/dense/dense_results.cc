@@ -131,6 +131,8 @@ void fill_counts(const DenseFrontEnd& front_end, RunDocuments& documents) {
 void tell_clock(const ReadRecording& recording, DenseFrontEnd& front_end, RunSummary& summary) {
   const ScopedTimer timer(front_end.times(), "finish_imu_clock");
   tell_imu_clock(front_end.clock_check(), recording.log, summary);
+  if (const auto offset = front_end.odometry().lidar_offset())
+    tell_lidar_offset(*offset, recording.log);
 }
 
 // Place and clock of the IMU as the recording itself tells them.
