@@ -325,7 +325,7 @@ namespace tree_crowns {  // forest/trees/tree_crowns.cc
 // m: height of the layers of a crown [chosen]
 inline constexpr double kLayer = 0.5;
 // Directions in which the width of a layer is measured [chosen]
-inline constexpr int kSectors = 16;
+inline constexpr std::size_t kSectors = 16;
 // Directions from one with points to the next: wider gaps are no part of the crown [chosen]
 inline constexpr std::size_t kWidestGap = 5;
 // m beyond the surface of the stem: what reaches farther is a branch [chosen]
@@ -341,8 +341,14 @@ inline constexpr std::size_t kLowParts = 3;
 inline constexpr std::size_t kBaseGap = 3;
 // Share of the cubes in a direction that lie within the edge of the crown [chosen]
 inline constexpr double kEdgeQuantile = 0.97;
-// The same of the outline of the whole crown [tuned on random seed 1: 0.97 to 1 were tried]
-inline constexpr double kOutlineQuantile = 0.99;
+// Directions in which the reach of a whole crown is measured [tuned on `random` 1 to 6, 8, 13, 16,
+// 49 to 51 and 55 to 60: docs/method/forest-experiments.md, crowns]
+inline constexpr std::size_t kOutlineSectors = 24;
+// Of these, how many must have been seen at least: of a crown that was seen from one side the
+// outline has less than half of the area [tuned likewise]
+inline constexpr std::size_t kFewestOutlineSectors = 21;
+// Times the median of these: what reaches farther is of another tree [tuned likewise]
+inline constexpr double kStickingOut = 1.45;
 }  // namespace tree_crowns
 
 namespace canopy_crowns {  // forest/trees/canopy_crowns.cc

@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "understory/forest/forest_constants.h"
+#include "understory/util/median.h"
 #include "understory/util/parallel.h"
 
 namespace understory {
@@ -15,23 +16,27 @@ using namespace forest_constants::tree_crowns;
 
 using Places = std::vector<Eigen::Vector2d>;
 
-// How far nearly all places in one direction reach; negative where there are none.
-using Reaches = std::array<double, kSectors>;
+// How far the places in one direction reach; negative where there are none.
+template <std::size_t Sectors>
+using Reaches = std::array<double, Sectors>;
 
+template <std::size_t Sectors>
 std::size_t sector_of(const Eigen::Vector2d& off) {
   const double turn = std::atan2(off.y(), off.x()) / (2.0 * M_PI) + 0.5;
-  return std::min<std::size_t>(kSectors - 1, static_cast<std::size_t>(turn * kSectors));
+  return std::min<std::size_t>(Sectors - 1, static_cast<std::size_t>(turn * Sectors));
 }
 
-Reaches reaches_of(const Places& places, const Eigen::Vector2d& middle, double quantile) {
-  std::array<std::vector<double>, kSectors> distances;
+// `quantile`: the share of the places in a direction that lie within.
+template <std::size_t Sectors>
+Reaches<Sectors> reaches_of(const Places& places, const Eigen::Vector2d& middle, double quantile) {
+  std::array<std::vector<double>, Sectors> distances;
   for (const Eigen::Vector2d& place : places) {
     const Eigen::Vector2d off = place - middle;
-    distances[sector_of(off)].push_back(off.norm());
+    distances[sector_of<Sectors>(off)].push_back(off.norm());
   }
-  Reaches reaches;
+  Reaches<Sectors> reaches;
   reaches.fill(-1.0);
-  for (std::size_t s = 0; s < kSectors; ++s) {
+  for (std::size_t s = 0; s < Sectors; ++s) {
     std::vector<double>& all = distances[s];
     if (all.empty()) continue;
     const auto at = static_cast<std::size_t>(quantile * static_cast<double>(all.size() - 1));
@@ -42,8 +47,8 @@ Reaches reaches_of(const Places& places, const Eigen::Vector2d& middle, double q
 }
 
 // Few points leave directions empty: narrow gaps are filled in from both sides.
-Reaches without_gaps(const Reaches& reaches) {
-  Reaches filled = reaches;
+Reaches<kSectors> without_gaps(const Reaches<kSectors>& reaches) {
+  Reaches<kSectors> filled = reaches;
   for (std::size_t s = 0; s < kSectors; ++s) {
     if (reaches[s] >= 0.0) continue;
     std::size_t before = 1;
@@ -64,7 +69,7 @@ Reaches without_gaps(const Reaches& reaches) {
 // Area around `middle` that the places fill: a sum of wedges.
 double outline_area(const Places& places, const Eigen::Vector2d& middle) {
   double area = 0.0;
-  for (const double reach : without_gaps(reaches_of(places, middle, kEdgeQuantile)))
+  for (const double reach : without_gaps(reaches_of<kSectors>(places, middle, kEdgeQuantile)))
     area += M_PI / kSectors * std::pow(std::max(0.0, reach), 2);
   return area;
 }
@@ -90,12 +95,18 @@ Places half_outline(Iterator begin, Iterator end) {
   return corners;
 }
 
-// The convex outline of the places, against the clock, without the few that stick out of it.
+// The convex outline of the places, against the clock. Crowns are round: what sticks out far is a
+// branch of a neighbour. Empty where a crown was seen from one side only.
 PlaneRing convex_outline(const Places& places, const Eigen::Vector2d& middle) {
-  const Reaches reaches = reaches_of(places, middle, kOutlineQuantile);
+  std::vector<double> seen;
+  for (const double reach : reaches_of<kOutlineSectors>(places, middle, 1.0)) {
+    if (reach >= 0.0) seen.push_back(reach);
+  }
+  if (seen.size() < kFewestOutlineSectors) return {};
+  const double most = kStickingOut * upper_median(std::move(seen));
   Places within;
   for (const Eigen::Vector2d& place : places)
-    if ((place - middle).norm() <= reaches[sector_of(place - middle)]) within.push_back(place);
+    if ((place - middle).norm() <= most) within.push_back(place);
   std::sort(within.begin(), within.end(), [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
   });
@@ -104,6 +115,19 @@ PlaneRing convex_outline(const Places& places, const Eigen::Vector2d& middle) {
   const Places back = half_outline(within.rbegin(), within.rend());
   if (back.size() > 2) outline.insert(outline.end(), back.begin() + 1, back.end() - 1);
   return outline;
+}
+
+// The middle of a crown: half way from its stem to where its places are. Branches of neighbours
+// draw at the second, and a crown that has grown to one side is not around the first.
+Eigen::Vector2d middle_of(const Places& places, const Eigen::Vector2d& stem) {
+  std::vector<double> x;
+  std::vector<double> y;
+  for (const Eigen::Vector2d& place : places) {
+    x.push_back(place.x());
+    y.push_back(place.y());
+  }
+  const Eigen::Vector2d median(upper_median(std::move(x)), upper_median(std::move(y)));
+  return 0.5 * (stem + median);
 }
 
 // The layers of one tree: its cubes by height.
@@ -151,16 +175,16 @@ TreeCrown crown_of(const std::vector<TreeOwners::Voxel>& voxels, const OwnerTree
   if (base == widths.size()) return crown;
   crown.base_m = static_cast<double>(base) * kLayer;
   Places all;
-  crown.volume_m3 = 0.0;
+  double volume = 0.0;
   for (std::size_t i = base; i < layers.size(); ++i) {
     all.insert(all.end(), layers[i].begin(), layers[i].end());
-    crown.volume_m3 += kLayer * M_PI * widths[i] * widths[i];
+    volume += kLayer * M_PI * widths[i] * widths[i];
   }
-  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
-  for (const Eigen::Vector2d& place : all)
-    middle += place / static_cast<double>(all.size());
-  crown.outline = convex_outline(all, middle);
+  const double half_way = 0.5 * kLayer * static_cast<double>(base + layers.size());
+  crown.outline = convex_outline(all, middle_of(all, centre_at(tree, half_way)));
+  if (crown.outline.empty()) return crown;
   crown.area_m2 = std::abs(signed_area_m2(crown.outline));
+  crown.volume_m3 = volume;
   return crown;
 }
 

@@ -8,7 +8,8 @@
 
 namespace understory {
 
-// The crown of a tree, from the cubes that belong to it. NaN where none was seen.
+// The crown of a tree, from the cubes that belong to it. NaN where none was seen. Area and volume
+// are also NaN, and the outline is empty, where it was seen from one side only.
 struct TreeCrown {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -18,8 +19,9 @@ struct TreeCrown {
   PlaneRing outline;            // seen from above: convex, against the clock, metres
 };
 
-// Base, area and volume of each crown. The area is that of the convex outline; the outlines of the
-// layers are made of sixteen wedges. Nearly all cubes of each of sixteen directions lie within.
+// Base, area and volume of each crown. The area is that of the convex outline, without what sticks
+// out far. The outlines of the layers are made of sixteen wedges. Nearly all cubes of each of
+// sixteen directions lie within.
 [[nodiscard]] std::vector<TreeCrown> measure_crowns(const TreeOwners& owners,
                                                     const std::vector<OwnerTree>& trees);
 

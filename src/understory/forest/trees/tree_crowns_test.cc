@@ -7,11 +7,11 @@
 namespace understory {
 namespace {
 
-// A disc of points at a height.
-void add_disc(TreeOwners& owners, double radius_m, double height_m) {
+// A disc of points at a height, its middle beside the origin.
+void add_disc(TreeOwners& owners, double radius_m, double height_m, double aside_m = 0.0) {
   for (double x = -radius_m; x <= radius_m; x += 0.1) {
     for (double y = -radius_m; y <= radius_m; y += 0.1)
-      if (std::hypot(x, y) <= radius_m) owners.add({x, y}, height_m);
+      if (std::hypot(x, y) <= radius_m) owners.add({x + aside_m, y}, height_m);
   }
 }
 
@@ -42,6 +42,58 @@ TEST(TreeCrowns, TheAreaIsThatOfTheConvexOutline) {
   const TreeCrown crown = crown_with_bush(0.0);
   EXPECT_NEAR(crown.area_m2, M_PI * 4.0, 0.06 * M_PI * 4.0);
   EXPECT_NEAR(crown.volume_m3, 7.0 * M_PI * 4.0, 0.15 * 7.0 * M_PI * 4.0);
+}
+
+// A stem with a crown of 2 m from 8 to 15 m.
+TreeOwners stem_with_crown(double aside_m) {
+  TreeOwners owners;
+  for (double height = 0.3; height < 15.0; height += 0.1)
+    add_disc(owners, 0.1, height);
+  for (double height = 8.0; height < 15.0; height += 0.1)
+    add_disc(owners, 2.0, height, aside_m);
+  return owners;
+}
+
+TEST(TreeCrowns, BranchesOfANeighbourDoNotWidenTheOutline) {
+  TreeOwners owners = stem_with_crown(0.0);
+  // A branch of 0.6 m that leads from the crown to 4.5 m.
+  for (double x = 0.0; x < 4.5; x += 0.1) {
+    for (double y = -0.3; y <= 0.3; y += 0.1)
+      for (double height = 10.0; height < 10.6; height += 0.1)
+        owners.add({x, y}, height);
+  }
+  const std::vector<OwnerTree> trees = {owner_tree(15.0)};
+  owners.find(trees, {});
+  EXPECT_GT(owners.owner({4.2, 0.0}, 10.3), TreeOwners::kNobody);
+  EXPECT_NEAR(measure_crowns(owners, trees)[0].area_m2, M_PI * 4.0, 0.16 * M_PI * 4.0);
+}
+
+// Three quarters of a crown hide behind the rest.
+TEST(TreeCrowns, ACrownSeenFromOneSideHasABaseAndNoArea) {
+  TreeOwners owners;
+  for (double height = 0.3; height < 15.0; height += 0.1)
+    add_disc(owners, 0.1, height);
+  for (double height = 8.0; height < 15.0; height += 0.1) {
+    for (double x = 0.1; x < 2.0; x += 0.1) {
+      for (double y = -2.0; y < 2.0; y += 0.1)
+        if (std::hypot(x, y) <= 2.0 && std::abs(y) < x) owners.add({x + 0.1, y}, height);
+    }
+  }
+  const std::vector<OwnerTree> trees = {owner_tree(15.0)};
+  owners.find(trees, {});
+  const TreeCrown crown = measure_crowns(owners, trees)[0];
+  EXPECT_NEAR(crown.base_m, 8.0, 0.51);
+  EXPECT_TRUE(std::isnan(crown.area_m2));
+  EXPECT_TRUE(std::isnan(crown.volume_m3));
+  EXPECT_TRUE(crown.outline.empty());
+}
+
+// A crown leans to the light.
+TEST(TreeCrowns, ACrownBesideItsStemKeepsItsArea) {
+  TreeOwners owners = stem_with_crown(0.8);
+  const std::vector<OwnerTree> trees = {owner_tree(15.0)};
+  owners.find(trees, {});
+  EXPECT_NEAR(measure_crowns(owners, trees)[0].area_m2, M_PI * 4.0, 0.08 * M_PI * 4.0);
 }
 
 TEST(TreeCrowns, TheOutlineRunsAgainstTheClockRoundTheCrown) {

@@ -263,7 +263,9 @@ void DenseOdometry::watch_lidars(const Scan& scan, const MatchTargetPtr& local_m
     const RegistrationResult match =
         own.empty() ? RegistrationResult()
                     : match_cloud(*local_map, own, matched, {}, MatchStart::kNear);
-    const bool found = match.usable() && match.inlier_ratio >= config_.match.min_inlier_ratio;
+    // A lidar that looks at the ground alone slides over it.
+    const bool found = match.usable() && match.degenerate_directions.cols() == 0 &&
+                       match.inlier_ratio >= config_.match.min_inlier_ratio;
     poses.push_back(found ? std::optional(match.target_from_source) : std::nullopt);
   }
   agreement_.add(poses);

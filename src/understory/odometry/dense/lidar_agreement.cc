@@ -71,8 +71,8 @@ bool LidarAgreement::wants(const StampedPose& matched) {
   if (!before || since_probe_ < kEvery) return false;
   const double between = to_seconds(matched.stamp - before->stamp);
   if (between <= 0.0 || between > kLongestEvenStepS) return false;
-  speed_ =
-      motion_in_metres((before->world_from_body.inverse() * matched.world_from_body).log() / between);
+  speed_ = motion_in_metres((before->world_from_body.inverse() * matched.world_from_body).log() /
+                            between);
   if (speed_.norm() < kLeastSpeed) return false;
   since_probe_ = 0;
   return true;
@@ -82,7 +82,8 @@ void LidarAgreement::add(const std::vector<std::optional<Pose>>& poses) {
   if (poses.empty() || !poses.front()) return;
   further_.resize(std::max(further_.size(), poses.size() - 1));
   for (std::size_t i = 1; i < poses.size(); ++i) {
-    if (poses[i]) further_[i - 1].add(motion_in_metres((poses[0]->inverse() * *poses[i]).log()), speed_);
+    if (poses[i])
+      further_[i - 1].add(motion_in_metres((poses[0]->inverse() * *poses[i]).log()), speed_);
   }
 }
 

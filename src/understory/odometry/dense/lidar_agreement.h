@@ -12,11 +12,11 @@ namespace understory {
 // Where the points of a further lidar lie beside those of the first one, by the matches of each.
 // Turns count by what they move at a usual range (motion_in_metres).
 struct LidarOffset {
-  std::size_t lidar = 0;     // 1: the second one
-  int probes = 0;            // scans that were looked at
-  double apart_m = 0.0;      // root mean square, of the next two together
-  double late_s = 0.0;       // that its clock is late by: what changes with the motion
-  double late_sd_s = 0.0;    // standard deviation, by how the probes differ
+  std::size_t lidar = 0;   // 1: the second one
+  int probes = 0;          // scans that were looked at
+  double apart_m = 0.0;    // root mean square, of the next two together
+  double late_s = 0.0;     // that its clock is late by: what changes with the motion
+  double late_sd_s = 0.0;  // standard deviation, by how the probes differ
   // What does not change with the motion, by a wrong place on the body. The place is off by more:
   // the map holds the points of both lidars, and draws those of each to itself.
   double misplaced_m = 0.0;

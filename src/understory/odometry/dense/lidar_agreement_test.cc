@@ -21,8 +21,8 @@ Vector6d noise(Random& random, double sd) {
 // A body that goes forward and sideways at a speed that changes, and turns.
 Vector6d speed_at(int i) {
   Vector6d speed;
-  speed << 0.0, 0.0, 2.0 * std::sin(0.7 * i), 1.0 + 0.5 * std::sin(0.3 * i), 0.2 * std::cos(0.5 * i),
-      0.0;
+  speed << 0.0, 0.0, 2.0 * std::sin(0.7 * i), 1.0 + 0.5 * std::sin(0.3 * i),
+      0.2 * std::cos(0.5 * i), 0.0;
   return speed;
 }
 
@@ -91,7 +91,8 @@ TEST(LidarOffsetSums, AnEvenMotionTellsNoCause) {
 
 // Scans every 0.1 s along x at 1 m/s.
 StampedPose pose_at(int scan, double speed_m_s = 1.0) {
-  return {1 + scan * kTenth, Pose(Eigen::Quaterniond::Identity(), {0.1 * speed_m_s * scan, 0.0, 0.0})};
+  return {1 + scan * kTenth,
+          Pose(Eigen::Quaterniond::Identity(), {0.1 * speed_m_s * scan, 0.0, 0.0})};
 }
 
 TEST(LidarAgreement, LooksAtEachFifthScanOfABodyThatMoves) {
