@@ -344,7 +344,7 @@ inline constexpr double kEdgeQuantile = 0.97;
 // Directions in which the reach of a whole crown is measured [tuned on `random` 1 to 6, 8, 13, 16,
 // 49 to 51 and 55 to 60: docs/method/forest-experiments.md, crowns]
 inline constexpr std::size_t kOutlineSectors = 24;
-// Of these, how many must have been seen at least: of a crown that was seen from one side the
+// Of these, how many must have been seen at least. Of a crown that was seen from one side the
 // outline has less than half of the area [tuned likewise]
 inline constexpr std::size_t kFewestOutlineSectors = 21;
 // Times the median of these: what reaches farther is of another tree [tuned likewise]
