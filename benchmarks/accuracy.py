@@ -310,11 +310,12 @@ def main():
         good = measure_spoilt_runs(work, options.seeds, options.wanted, options.write, options.fit,
                                    options.way)
         return 0 if good else 1
-    table, begin, failure = Table(), time.perf_counter(), None
-    ran = True
+    table, begin, failure, ran = Table(), time.perf_counter(), None, True
     try:
         if floors:
             measure(table, work, options)
+            if options.write:  # before the sites, which take longer
+                write_results(render(table, options.short, time.perf_counter() - begin)[0])
         if papers and not options.short:
             ran = measure_sites(work, papers, options.seeds or REPORTED_SEEDS[:1], options.whole,
                                 options.write)
@@ -328,12 +329,12 @@ def main():
         return 0 if ran and not failure else 1
     text, missed = render(table, options.short, time.perf_counter() - begin)
     print(text)
-    if options.write:
-        write_results(text)
     for name in missed:
         say(f"floor missed: {name}")
     if failure:
         say(f"failed: {failure}")
+        if options.write:
+            write_results(text)
     return 1 if missed or failure or not ran else 0
 
 
