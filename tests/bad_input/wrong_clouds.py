@@ -6,6 +6,9 @@ import json
 import math
 import random
 
+import laspy
+import numpy as np
+
 from program import Cases, program, simulated
 
 cases = Cases()
@@ -66,6 +69,20 @@ def good_plot(folder):
     meadow = write_ply(folder / "meadow.ply", [p for p in plot() if p[2] < 0.2])
     assert inventory(meadow, folder).returncode in (0, 4)
     return f"{len(listed(folder))} trees in the meadow"
+
+
+@cases.case("a LAS file whose places are rounded to a decimetre is told, one of centimetres is not")
+def rounded_places(folder):
+    for scale, told in ((0.01, False), (0.1, True)):
+        cloud = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+        cloud.header.scales = [scale] * 3
+        cloud.x, cloud.y, cloud.z = np.array(plot()).T
+        cloud.write(folder / "rounded.las")
+        done = inventory(folder / "rounded.las", folder)
+        assert done.returncode in (0, 4), done
+        assert ("inventory.coarse_places" in done.stderr) == told, (scale, done.stderr)
+        assert ("steps of 0.1 m" in done.stderr) == told, (scale, done.stderr)
+    return done.stderr
 
 
 # The matrix alone says kilometres where the cloud moved by decimetres.

@@ -192,6 +192,8 @@ inline constexpr double kShortShare = 0.85;
 namespace stand_cloud {  // pipeline/inventory/stand_cloud.cc
 // m by which places may be rounded: a tenth of a thin stem [chosen]
 inline constexpr double kCoarsestStepM = 0.01;
+// Times that step, which a file holds in binary, or in feet [bound: rounding]
+inline constexpr double kRounding = 1.01;
 // Share by which a unit of heights is another one than that of the plane: international and US
 // feet differ by 2e-6 [chosen]
 inline constexpr double kSameUnit = 1e-4;
@@ -233,6 +235,13 @@ inline constexpr double kSureSlope = 1e-9;
 // Points after which the slope that all sectors have is looked for again [chosen: speed alone]
 inline constexpr std::size_t kPointsPerLook = 512;
 }  // namespace lidar_view
+
+namespace run_tops {  // pipeline/georeferencing/methods/run_tops.cc
+// m from a tree to one whose crown may hide its top [chosen: the radius of most crowns]
+inline constexpr double kOvertopReachM = 2.5;
+// m that such a one is higher by [chosen: several times what heights err by]
+inline constexpr double kClearlyHigherM = 2.0;
+}  // namespace run_tops
 
 namespace georeferencing {  // pipeline/georeferencing/methods/place_by_*.cc
 // degrees: with a less certain heading a place 50 m from the path's middle is over 4 m off

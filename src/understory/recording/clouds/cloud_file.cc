@@ -117,6 +117,7 @@ PointCloudFile described_by(const LasHeader& header) {
   PointCloudFile cloud;
   cloud.coordinate_system = header.coordinate_system;
   cloud.gps_week_time = header.gps_week_time;
+  cloud.las_step = header.scale.maxCoeff();
   cloud.format = std::string(header.compressed ? "LAZ" : "LAS") + " 1." +
                  std::to_string(header.version_minor) + ", point format " +
                  std::to_string(header.point_format);

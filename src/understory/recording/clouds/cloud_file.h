@@ -30,6 +30,7 @@ struct PointCloudFile {
   // Distance of neighbouring numbers at the first point, in which a file of single precision holds
   // its coordinates; 0: it holds them in double precision.
   double step = 0.0;
+  double las_step = 0.0;         // LAS: the coarsest step of its three coordinates; else 0
   std::uint64_t not_finite = 0;  // points that were left out: no places (is_place)
 };
 

@@ -4,10 +4,14 @@
 #include <limits>
 
 #include "understory/features/tree_tops.h"
+#include "understory/geometry/plane/plane_grid.h"
 #include "understory/georeference/terrain_file.h"
+#include "understory/pipeline/pipeline_constants.h"
 
 namespace understory {
 namespace {
+
+using namespace pipeline_constants::run_tops;
 
 constexpr double kEverywhere = std::numeric_limits<double>::max();
 
@@ -39,6 +43,24 @@ std::vector<Tree> tops_of_run(const std::filesystem::path& folder, const Movable
     trees.push_back(tree);
   }
   return trees;
+}
+
+std::vector<Tree> without_overtopped(const std::vector<Tree>& trees) {
+  SparsePoints places;
+  for (const Tree& tree : trees)
+    places.emplace_back(tree.x, tree.y, 0.0);
+  const PlaneGrid grid(places);
+  std::vector<Tree> kept;
+  for (std::size_t i = 0; i < trees.size(); ++i) {
+    bool overtopped = false;
+    grid.around(places[i], kOvertopReachM, [&](int other) {
+      const auto j = static_cast<std::size_t>(other);
+      overtopped |= (places[j] - places[i]).norm() < kOvertopReachM &&
+                    trees[j].height_m > trees[i].height_m + kClearlyHigherM;
+    });
+    if (!overtopped) kept.push_back(trees[i]);
+  }
+  return kept;
 }
 
 }  // namespace understory

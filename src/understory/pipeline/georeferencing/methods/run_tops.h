@@ -15,4 +15,8 @@ namespace understory {
 [[nodiscard]] std::vector<Tree> tops_of_run(const std::filesystem::path& folder,
                                             const MovableRun& run);
 
+// The trees that a canopy shows: without those that stand close to a clearly higher one, below its
+// crown. The top above such a tree is its neighbour's. Trees without a height are kept.
+[[nodiscard]] std::vector<Tree> without_overtopped(const std::vector<Tree>& trees);
+
 }  // namespace understory

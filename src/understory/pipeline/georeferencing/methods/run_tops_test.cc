@@ -65,5 +65,26 @@ TEST(RunTops, NeedNoTerrainButACanopy) {
   EXPECT_NEAR(tops[0].x, 510.1, 0.1);
 }
 
+Tree tree_at(double x, double height_m) {
+  Tree tree;
+  tree.x = x;
+  tree.y = 3.0;
+  tree.height_m = height_m;
+  return tree;
+}
+
+TEST(RunTops, TreesBelowTheCrownsOfOthersHaveNone) {
+  // Below a neighbour; hardly lower; far enough away; of no known height beside a high one.
+  const std::vector<Tree> trees = {tree_at(0.0, 18.0),  tree_at(2.0, 9.0),
+                                   tree_at(-2.0, 17.0), tree_at(10.0, 18.0),
+                                   tree_at(13.0, 9.0),  tree_at(30.0, Tree::kUnknown),
+                                   tree_at(31.0, 18.0)};
+  const std::vector<Tree> kept = without_overtopped(trees);
+  ASSERT_EQ(kept.size(), 6U);
+  for (const Tree& tree : kept)
+    EXPECT_NE(tree.x, 2.0);
+  EXPECT_TRUE(without_overtopped({}).empty());
+}
+
 }  // namespace
 }  // namespace understory

@@ -154,8 +154,13 @@ FoundTrees find_trees(const GeoreferenceRequest& request, const MovableRun& run,
   const bool both = tops.size() >= kFewestTrees;
   TreeMatchConfig config = request.trees;
   if (both) config.most_chance /= 2.0;  // two searches, one of which chance may favour
-  found.match = match_tree_maps(run.trees, found.target.trees, area, config, request.progress);
-  found.trees_of_run = run.trees.size();
+  std::vector<Tree> stems = run.trees;
+  if (found.target.from_cloud) {
+    std::vector<Tree> seen = without_overtopped(run.trees);
+    if (seen.size() >= kFewestTrees) stems = std::move(seen);
+  }
+  found.match = match_tree_maps(stems, found.target.trees, area, config, request.progress);
+  found.trees_of_run = stems.size();
   if (both) {
     const TreeMatch match =
         match_tree_maps(tops, found.target.trees, area, config, request.progress);
