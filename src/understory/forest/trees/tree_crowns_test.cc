@@ -90,7 +90,7 @@ TEST(TreeCrowns, ACrownSeenFromOneSideHasABaseAndNoArea) {
 
 // A crown leans to the light.
 TEST(TreeCrowns, ACrownBesideItsStemKeepsItsArea) {
-  TreeOwners owners = stem_with_crown(0.8);
+  TreeOwners owners = stem_with_crown(1.5);
   const std::vector<OwnerTree> trees = {owner_tree(15.0)};
   owners.find(trees, {});
   EXPECT_NEAR(measure_crowns(owners, trees)[0].area_m2, M_PI * 4.0, 0.08 * M_PI * 4.0);
