@@ -77,7 +77,7 @@ TEST(RunTops, TreesBelowTheCrownsOfOthersHaveNone) {
   // Below a neighbour; hardly lower; far enough away; of no known height beside a high one.
   const std::vector<Tree> trees = {tree_at(0.0, 18.0),  tree_at(2.0, 9.0),
                                    tree_at(-2.0, 17.0), tree_at(10.0, 18.0),
-                                   tree_at(13.0, 9.0),  tree_at(30.0, Tree::kUnknown),
+                                   tree_at(12.6, 9.0),  tree_at(30.0, Tree::kUnknown),
                                    tree_at(31.0, 18.0)};
   const std::vector<Tree> kept = without_overtopped(trees);
   ASSERT_EQ(kept.size(), 6U);
