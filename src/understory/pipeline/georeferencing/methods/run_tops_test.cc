@@ -75,12 +75,14 @@ Tree tree_at(double x, double height_m) {
 
 TEST(RunTops, TreesBelowTheCrownsOfOthersHaveNone) {
   // Below a neighbour; hardly lower; far enough away; of no known height beside a high one.
-  const std::vector<Tree> trees = {tree_at(0.0, 18.0),  tree_at(2.0, 9.0),
-                                   tree_at(-2.0, 17.0), tree_at(10.0, 18.0),
-                                   tree_at(12.6, 9.0),  tree_at(30.0, Tree::kUnknown),
-                                   tree_at(31.0, 18.0)};
+  std::vector<Tree> trees = {tree_at(0.0, 18.0),  tree_at(2.0, 9.0),  tree_at(-2.0, 17.0),
+                             tree_at(10.0, 18.0), tree_at(12.6, 9.0), tree_at(30.0, Tree::kUnknown),
+                             tree_at(31.0, 18.0)};
+  // A wide map, whose grid is coarse.
+  trees.push_back(tree_at(60.0, 18.0));
+  trees.back().y = 70.0;
   const std::vector<Tree> kept = without_overtopped(trees);
-  ASSERT_EQ(kept.size(), 6U);
+  ASSERT_EQ(kept.size(), 7U);
   for (const Tree& tree : kept)
     EXPECT_NE(tree.x, 2.0);
   EXPECT_TRUE(without_overtopped({}).empty());
