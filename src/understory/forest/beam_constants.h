@@ -12,10 +12,9 @@ inline constexpr double kLeastCosine = 0.08;
 // Part of a beam that must be on the stem so that half of its echoes are the stem's own. With less,
 // the echo from behind is stronger [tuned with kOneSided: 0.1, 0.15 and 0.2 were tried]
 inline constexpr double kLeastPart = 0.1;
-// Of the excess of the width, that of the radius of a stem seen from one side; twice as much as at
-// half a circumference [tuned on maps of `random` 1 to 6, 8, 13, 16, 49 to 51 and 55 to 60 by the
-// program's own path, with the next two and kNoise, and 64 to 66:
-// docs/method/forest-experiments.md]
+// Share of the excess of the width that the radius of a stem has which was seen from one side. At
+// half a circumference it is half of that. [tuned on maps of `random` by the program's own path,
+// with the next two and kNoise. Seeds: docs/method/forest-experiments.md, the noise of the ranges]
 inline constexpr double kOneSided = 1.46;
 // Standard deviations of a beam that the radius grows by from whichever side it was seen
 // [tuned likewise]

@@ -101,10 +101,7 @@ std::optional<LidarOffset> LidarAgreement::worst() const {
 }
 
 void LidarAgreement::save(BinaryWriter& writer) const {
-  writer.put(last_.has_value());
-  const StampedPose last = last_.value_or(StampedPose{});
-  writer.put(last.stamp);
-  put_pose(writer, last.world_from_body);
+  put_optional(writer, last_, put_stamped_pose);
   writer.put(since_probe_);
   writer.put(std::uint64_t{further_.size()});
   for (const LidarOffsetSums& sums : further_)
@@ -112,11 +109,7 @@ void LidarAgreement::save(BinaryWriter& writer) const {
 }
 
 void LidarAgreement::load(BinaryReader& reader) {
-  const bool any = reader.get<bool>();
-  StampedPose last;
-  last.stamp = reader.get<TimeNs>();
-  last.world_from_body = get_pose(reader);
-  last_ = any ? std::optional(last) : std::nullopt;
+  last_ = get_optional(reader, get_stamped_pose);
   since_probe_ = reader.get<int>();
   further_.resize(reader.get<std::uint64_t>());
   for (LidarOffsetSums& sums : further_)

@@ -79,20 +79,13 @@ void ScanMotionWatch::move_world(const Pose& new_world_from_old_world) {
 }
 
 void ScanMotionWatch::save(BinaryWriter& writer) const {
-  writer.put(last_.has_value());
-  const StampedPose last = last_.value_or(StampedPose{});
-  writer.put(last.stamp);
-  put_pose(writer, last.world_from_body);
+  put_optional(writer, last_, put_stamped_pose);
   writer.put(since_probe_);
   sums_.save(writer);
 }
 
 void ScanMotionWatch::load(BinaryReader& reader) {
-  const bool any = reader.get<bool>();
-  StampedPose last;
-  last.stamp = reader.get<TimeNs>();
-  last.world_from_body = get_pose(reader);
-  last_ = any ? std::optional(last) : std::nullopt;
+  last_ = get_optional(reader, get_stamped_pose);
   since_probe_ = reader.get<int>();
   sums_.load(reader);
 }

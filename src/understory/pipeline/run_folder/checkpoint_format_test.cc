@@ -45,7 +45,7 @@ TEST(CheckpointFormat, GrowsWithWhatIsKept) {
   EXPECT_EQ(saved(EventOrderer(EventOrderer::Config(), log)), 1142U);
   EXPECT_EQ(saved(ImuWatch(9.81, nullptr)), 613U);
   EXPECT_EQ(saved(ImuUsage()), 25U);
-  EXPECT_EQ(saved(LidarAgreement()), 77U);
+  EXPECT_EQ(saved(LidarAgreement()), 13U);
   EXPECT_EQ(saved(LidarOffsetSums()), 244U);
   EXPECT_EQ(saved(LidarImuClockCheck()), 41U);
   EXPECT_EQ(saved(OnlineImuCalibration()), 569U);
