@@ -10,8 +10,9 @@ each RUN with the true trees of 5 cm and more on the whole plot, and pools all p
 error, root mean square error, and that of the error over its stated standard deviation (1 where the
 deviations are right). The frame of RUN must be that of the truth. A map that is made from a recording is
 not: the plots lie along the path of the run (--plots RUN). --align lays the truth on the map by the
-trees. A run on the globe has its plots in the map projection of its layers, as `inventory --plots` takes
-them. Its trees tell how both frames lie to each other: trees.gpkg and trees.csv have them. Needs numpy.
+trees. Of a run on the globe, --plots writes the plots in the map projection of its layers, as `inventory
+--plots` takes them. Its trees tell how both frames lie to each other: trees.gpkg and trees.csv have them.
+Needs numpy.
 """
 import argparse
 import csv
@@ -68,9 +69,6 @@ class LayerFrame:
 
     def to_layers(self, places):
         return as_rows(self.layer_middle + self.turn * (as_complex(places) - self.middle))
-
-    def from_layers(self, places):
-        return as_rows(self.middle + (as_complex(places) - self.layer_middle) / self.turn)
 
 
 def as_complex(places):
@@ -138,13 +136,11 @@ def compare(run, truth, align, errors, shares):
         rotation, shift = inventory_table.alignment(run, truth)  # from the map to the truth
         for tree in trees:
             tree["x"], tree["y"] = (rotation.T @ (np.array([tree["x"], tree["y"], tree["z"]]) - shift))[:2]
-    frame = LayerFrame(run)
     for row in rows_of(f"{run}/plots.csv"):
         if row["kind"] != "circle":
             continue
         shares.append(number(row["seen_share"]))
-        ((x, y),) = frame.from_layers([[number(row["x"]), number(row["y"])]])
-        true = figures_of_truth(trees, x, y, number(row["radius_m"]))
+        true = figures_of_truth(trees, number(row["x"]), number(row["y"]), number(row["radius_m"]))
         if shares[-1] < LEAST_SEEN or true is None:
             continue
         for name, sd in FIGURES.items():

@@ -62,5 +62,10 @@ inline constexpr std::size_t kSides = 8;
 inline constexpr int kLeastFoliage = 5;
 // Directions with foliage at least [tuned on random seeds 1, 4, 9]
 inline constexpr int kLeastSides = 7;
+// m of diameter for each metre of the column above breast height, at most. Foliage that is as dense
+// as a stem looks thicker [chosen: spruces of open ground have 0.015 to 0.025]
+inline constexpr double kMostStout = 0.03;
+// m below the end of the slices: a column that ends there goes on [chosen]
+inline constexpr double kGoesOnWithin = 0.3;
 
 }  // namespace understory::foliage_constants

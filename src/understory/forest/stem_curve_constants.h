@@ -95,6 +95,10 @@ inline constexpr double kLeastArcDeg = 60.0;
 // Points of a section that tell as much of how far around it was seen as the arc of the whole stem
 // [tuned on random seeds 8, 9 and 16 with beam.sensor: 0, 30, 100 and all]
 inline constexpr double kArcPoints = 100.0;
+// m from breast height: sections that tell how much thicker all are than the stem there [chosen]
+inline constexpr double kAnchorReach = 0.8;
+// Sections without an offset that count beside them [chosen]
+inline constexpr double kAnchorPrior = 1.0;
 // Power of the distance to the top that a stem's diameter follows. Most stems lie between a
 // paraboloid (0.5) and a cone (1) [bound: Laasasenaho 1982 has 0.6 to 0.7 for pine and spruce]
 inline constexpr double kUsualPower = 0.7;

@@ -206,4 +206,9 @@ bool stands_in_foliage(const std::vector<SlicePoint>& near, const StemFit& colum
                        [](int count) { return count >= kLeastFoliage; }) >= kLeastSides;
 }
 
+bool is_too_stout(const StemFit& column, double slices_end_m) {
+  if (column.highest_m > slices_end_m - kGoesOnWithin) return false;
+  return 2.0 * column.radius_m > kMostStout * (column.highest_m - kBreastHeight);
+}
+
 }  // namespace understory

@@ -24,4 +24,9 @@ namespace understory {
 // or the side of a vehicle has none behind it.
 [[nodiscard]] bool stands_in_foliage(const std::vector<SlicePoint>& near, const StemFit& column);
 
+// Whether a column within foliage ends too low for its diameter: the dense foliage of a seedling
+// can look like a stem of several centimetres. `slices_end_m`: height above the ground up to which
+// points were searched. A column that goes on beyond it is none.
+[[nodiscard]] bool is_too_stout(const StemFit& column, double slices_end_m);
+
 }  // namespace understory

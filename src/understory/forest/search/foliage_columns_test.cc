@@ -94,5 +94,18 @@ TEST(FoliageColumns, FoliageStandsToAllSides) {
   EXPECT_FALSE(stands_in_foliage(wall, column));
 }
 
+TEST(FoliageColumns, ALowColumnIsThin) {
+  StemFit column;
+  column.radius_m = 0.02;
+  column.highest_m = 2.2;  // a seedling: 2.7 cm at most
+  EXPECT_TRUE(is_too_stout(column, 3.5));
+  column.radius_m = 0.013;
+  EXPECT_FALSE(is_too_stout(column, 3.5));
+  column.radius_m = 0.045;
+  column.highest_m = 3.4;  // it goes on
+  EXPECT_FALSE(is_too_stout(column, 3.5));
+  EXPECT_TRUE(is_too_stout(column, 4.5));
+}
+
 }  // namespace
 }  // namespace understory

@@ -13,6 +13,7 @@ namespace understory {
 namespace {
 
 using namespace forest_constants::stand_figures;
+using forest_constants::stand_errors::kSharedDiameter;
 
 double squared(double value) {
   return value * value;
@@ -32,6 +33,11 @@ double basal_area_m2(const StandTree& tree) {
 // Its standard deviation.
 double basal_area_sd_m2(const StandTree& tree) {
   return 0.5 * M_PI * tree.dbh_m.value * tree.dbh_m.sd;
+}
+
+// What the error of the diameter does to a volume, which goes with the square of the diameter.
+double by_diameter(const StandTree& tree, const Measured& volume) {
+  return 2.0 * volume.value * tree.dbh_m.sd / tree.dbh_m.value;
 }
 
 // The diameter as it counts in a mean weighted by basal area. The mean cube of a noisy diameter is
@@ -78,19 +84,29 @@ class PlotSums {
       if (candidate.inside) total += value(*candidate.tree);
     return total;
   }
-  // A tree beyond the border whose pull is not known does not count for the deviation.
-  [[nodiscard]] double sd(const Value& pull, const Value& spread) const {
+  // A tree beyond the border whose pull is not known does not count for the deviation. `by_dbh`:
+  // the part of the spread, with its sign, that goes with the error of the diameter. All trees
+  // share some of that.
+  [[nodiscard]] double sd(const Value& pull, const Value& spread, const Value& by_dbh) const {
     double variance = 0.0;
+    double shared = 0.0;
     for (const Candidate& candidate : candidates_) {
       const double z2 = squared(pull(*candidate.tree));
       if (candidate.inside) {
-        variance += squared(spread(*candidate.tree)) + missing_ * z2;
+        const double own_shared = kSharedDiameter * by_dbh(*candidate.tree);
+        shared += own_shared;
+        variance += std::max(0.0, squared(spread(*candidate.tree)) - squared(own_shared));
+        variance += missing_ * z2;
         variance += candidate.wrong_side * z2;
       } else if (std::isfinite(z2)) {
         variance += candidate.wrong_side * z2;
       }
     }
-    return std::sqrt(variance);
+    return std::sqrt(variance + squared(shared));
+  }
+  // The same of a figure that does not depend on the diameters.
+  [[nodiscard]] double sd(const Value& pull, const Value& spread) const {
+    return sd(pull, spread, [](const StandTree&) { return 0.0; });
   }
 
  private:
@@ -113,11 +129,15 @@ class PlotSums {
   double missing_;  // share of the trees that are not in the sums
 };
 
-// A sum over the trees, by hectare.
+// A sum over the trees, by hectare. `by_dbh`: see PlotSums::sd.
+Measured by_hectare(const PlotSums& sums, double seen_m2, const PlotSums::Value& value,
+                    const PlotSums::Value& sd, const PlotSums::Value& by_dbh) {
+  const double factor = kHectare / seen_m2;
+  return {factor * sums.sum(value), factor * sums.sd(value, sd, by_dbh)};
+}
 Measured by_hectare(const PlotSums& sums, double seen_m2, const PlotSums::Value& value,
                     const PlotSums::Value& sd) {
-  const double factor = kHectare / seen_m2;
-  return {factor * sums.sum(value), factor * sums.sd(value, sd)};
+  return by_hectare(sums, seen_m2, value, sd, [](const StandTree&) { return 0.0; });
 }
 
 // The mean of a value weighted by basal area. `along`: its standard deviation that goes with that
@@ -128,14 +148,16 @@ Measured weighted(const PlotSums& sums, const PlotSums::Value& value, const Plot
   if (!(weight > 0.0)) return {};
   const double mean =
       sums.sum([&](const StandTree& tree) { return basal_area_m2(tree) * value(tree); }) / weight;
+  const auto by_dbh = [&](const StandTree& tree) {
+    return (basal_area_sd_m2(tree) * (value(tree) - mean) + basal_area_m2(tree) * along(tree)) /
+           weight;
+  };
   const double sd = sums.sd(
       [&](const StandTree& tree) { return basal_area_m2(tree) * (value(tree) - mean) / weight; },
       [&](const StandTree& tree) {
-        return std::hypot(
-            (basal_area_sd_m2(tree) * (value(tree) - mean) + basal_area_m2(tree) * along(tree)) /
-                weight,
-            basal_area_m2(tree) * own(tree) / weight);
-      });
+        return std::hypot(by_dbh(tree), basal_area_m2(tree) * own(tree) / weight);
+      },
+      by_dbh);
   return {mean, sd};
 }
 
@@ -144,9 +166,9 @@ Measured quadratic_mean(const PlotSums& sums) {
   if (!(count > 0.0)) return {};
   const double mean = sums.sum(basal_area_m2) / count;
   const double diameter = std::sqrt(4.0 / M_PI * mean);
-  const double sd =
-      sums.sd([&](const StandTree& tree) { return (basal_area_m2(tree) - mean) / count; },
-              [&](const StandTree& tree) { return basal_area_sd_m2(tree) / count; });
+  const auto spread = [&](const StandTree& tree) { return basal_area_sd_m2(tree) / count; };
+  const double sd = sums.sd(
+      [&](const StandTree& tree) { return (basal_area_m2(tree) - mean) / count; }, spread, spread);
   return {diameter, sd * diameter / (2.0 * mean)};
 }
 
@@ -295,14 +317,17 @@ StandFigures stand_figures(const StandTrees& stand, const VisibleArea& seen, con
   figures.stems_per_ha = by_hectare(sums, figures.seen_m2, one, [&](const StandTree& tree) {
     return std::sqrt(std::clamp(chance_in(tree, 0.0, limit), 0.0, 1.0));
   });
-  figures.basal_area_m2_per_ha = by_hectare(sums, figures.seen_m2, basal_area_m2, basal_area_sd_m2);
+  figures.basal_area_m2_per_ha =
+      by_hectare(sums, figures.seen_m2, basal_area_m2, basal_area_sd_m2, basal_area_sd_m2);
   figures.volume_m3_per_ha = by_hectare(
       sums, figures.seen_m2, [](const StandTree& tree) { return tree.volume_m3.value; },
-      [](const StandTree& tree) { return tree.volume_m3.sd; });
+      [](const StandTree& tree) { return tree.volume_m3.sd; },
+      [](const StandTree& tree) { return by_diameter(tree, tree.volume_m3); });
   if (stand.species != TaperSpecies::kUnknown)
     figures.national_m3_per_ha = by_hectare(
         sums, figures.seen_m2, [](const StandTree& tree) { return tree.national_volume_m3.value; },
-        [](const StandTree& tree) { return tree.national_volume_m3.sd; });
+        [](const StandTree& tree) { return tree.national_volume_m3.sd; },
+        [](const StandTree& tree) { return by_diameter(tree, tree.national_volume_m3); });
   fill_means(sums, figures);
   share_errors_of_heights(shared_height_sd(sums), figures);
   figures.classes = classes_of(sums, figures.seen_m2, config);

@@ -7,12 +7,14 @@
 #include <functional>
 #include <string>
 
+#include "understory/forest/stand_figure_constants.h"
 #include "understory/util/random.h"
 
 namespace understory {
 namespace {
 
 using Eigen::Vector2d;
+using forest_constants::stand_errors::kSharedDiameter;
 
 // A square from the origin, of which the part west of `seen_to_m` was seen.
 VisibleArea square_of(double side_m, double seen_to_m) {
@@ -199,14 +201,17 @@ void expect_calibrated(double seen_to_m, double missed, double rms_low, double r
     const std::vector<Tree> truth = stand_of(random, 50.0, 900.0);
     std::vector<Tree> listed;
     const double shared_height = random.normal(0.0, 0.3);
+    const double shared_dbh = random.normal(0.0, kSharedDiameter);
     for (Tree tree : truth) {
       if (tree.x > seen_to_m || random.chance(missed)) continue;
       tree.x_sd_m = tree.y_sd_m = random.uniform(0.1, 0.4);
       tree.x += random.normal(0.0, tree.x_sd_m);
       tree.y += random.normal(0.0, tree.y_sd_m);
       tree.dbh_sd_m = random.uniform(0.005, 0.03);
-      tree.dbh_m += random.normal(0.0, tree.dbh_sd_m);
-      tree.stem_volume_m3 *= 1.0 + shared_height / tree.height_m;
+      const double by_dbh = shared_dbh * tree.dbh_sd_m;
+      tree.stem_volume_m3 *= 1.0 + shared_height / tree.height_m + 2.0 * by_dbh / tree.dbh_m;
+      tree.dbh_m += by_dbh + std::sqrt(1.0 - kSharedDiameter * kSharedDiameter) * tree.dbh_sd_m *
+                                 random.normal();
       tree.stem_volume_sd_m3 = 0.1 * tree.stem_volume_m3;
       tree.stem_volume_m3 += random.normal(0.0, tree.stem_volume_sd_m3);
       tree.height_m =

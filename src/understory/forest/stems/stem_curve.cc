@@ -301,6 +301,26 @@ void add_volume(StemCurve& curve) {
   curve.volume_sd_m3 = sd;
 }
 
+// What the sections around breast height are thicker than the stem there. Its radius rests on many
+// more points than theirs, and the same errors stay in all sections. They have the weight of one
+// section more, which has no offset.
+double offset_at_breast_height(const StemFit& stem, const std::vector<FittedSection>& below,
+                               const std::vector<FittedSection>& above) {
+  double sums[2] = {0.0, 0.0};
+  int counts[2] = {0, 0};
+  for (const std::vector<FittedSection>* part : {&below, &above}) {
+    for (const FittedSection& ring : *part) {
+      const double rise = ring.height_m - kBreastHeight;
+      if (std::abs(rise) > kAnchorReach) continue;
+      const std::size_t side = rise > 0.0 ? 1 : 0;
+      sums[side] += ring.radius_m - stem.radius_m - kUsualTaper * rise;
+      ++counts[side];
+    }
+  }
+  const int both = counts[0] + counts[1];
+  return (sums[0] + sums[1]) / (both + kAnchorPrior);
+}
+
 // All sections upwards, without the part of their radii that wide beams add. They are followed as
 // the points show them: from the radius at breast height with that part.
 std::vector<FittedSection> sections_of(const std::vector<SlicePoint>& points, const StemFit& stem,
@@ -316,6 +336,11 @@ std::vector<FittedSection> sections_of(const std::vector<SlicePoint>& points, co
   for (std::vector<FittedSection>* part : {&rings, &above}) {
     for (FittedSection& ring : *part)
       ring.radius_m -= excess_radius_m(stem.beam, ring.radius_m, ring.seen_deg, stem.scatter_m);
+  }
+  const double offset = offset_at_breast_height(stem, rings, above);
+  for (std::vector<FittedSection>* part : {&rings, &above}) {
+    for (FittedSection& ring : *part)
+      ring.radius_m -= offset;
   }
   rings.push_back({kBreastHeight, stem.centre, stem.radius_m,
                    std::sqrt(std::max(0.0, stem.covariance(2, 2))) + kMapError});

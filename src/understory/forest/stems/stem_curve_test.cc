@@ -132,6 +132,19 @@ TEST(StemCurve, WhatWideBeamsAddIsTakenAwayAlongTheStem) {
 }
 
 // Whorls make no thicker stem: their points lie around it in some heights only.
+// Short sections come out thicker than the whole stem. All of them by as much.
+TEST(StemCurve, ItMeetsTheDiameterAtBreastHeight) {
+  Random random(9);
+  TestStem thicker;
+  thicker.dbh_m = 0.32;
+  TestStem stem;
+  const StemCurve curve = measure_stem_curve(thicker.points(random), stem.fit(), kTop, {});
+  for (const double height : {1.0, 1.6, 3.0, 5.0}) {
+    const double more = thicker.diameter(height) - stem.diameter(height);
+    EXPECT_LT(std::abs(error_at(curve, stem, height)), 0.45 * more) << height;
+  }
+}
+
 TEST(StemCurve, BranchesDoNotMakeItThicker) {
   Random random(4);
   const TestStem stem;

@@ -207,8 +207,8 @@ bool is_foliage_stem(const StemFitResult& fit, const std::vector<SlicePoint>& ne
   const StemFit& stem = fit.stem;
   return fit.converged && 2.0 * stem.radius_m >= config.min_dbh_m &&
          2.0 * stem.radius_m <= kFoliageDbh && fit.evidence.returns >= config.min_returns &&
-         lean_deg_of(stem) <= kAloneLeanDeg && stands_in_foliage(near, stem) &&
-         is_tree(stem, search.index, search.points, config);
+         lean_deg_of(stem) <= kAloneLeanDeg && !is_too_stout(stem, config.highest_m) &&
+         stands_in_foliage(near, stem) && is_tree(stem, search.index, search.points, config);
 }
 
 // Adds what no better stem explains.
