@@ -24,6 +24,7 @@
 #include "understory/forest/ground/ground.h"
 #include "understory/forest/slice/slice_thinner.h"
 #include "understory/forest/stems/beam_footprint.h"
+#include "understory/forest/stems/breast_height_sections.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/stems/stem_fit.h"
@@ -174,7 +175,9 @@ std::vector<FittedStem> fitted_stems(const std::string& path) {
     const StemFitResult first = fit_stem(near, start, config);
     if (!first.converged) continue;
     StemFitResult last = refine_stem(near, first, config);
-    if (last.converged) stems.push_back({kept, std::move(last)});
+    if (!last.converged) continue;
+    last.stem.radius_m = radius_with_sections(near, last.stem);
+    stems.push_back({kept, std::move(last)});
   }
   return stems;
 }

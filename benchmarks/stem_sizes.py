@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """Errors of diameters by distance and size, and the constants of diameter_sd_m fitted to them.
 
-    build/benchmarks/stem_sizes fit FILE ... | benchmarks/stem_sizes.py [--fit] [--fit-radius]
+    build/benchmarks/stem_sizes fit FILE ... | benchmarks/stem_sizes.py [--fit] [--fit-radius] [--leave-out]
 
 The table gives bias, RMSE and how many errors lie within one and two standard deviations. Rows are beams
 that are known (compensated), beams that are not, and a cloud of which the ranges are not known, either.
 --fit searches constants with which 68 % and 95 % do so in each class of 30 stems and more. --fit-radius fits those of
-excess_radius_m to stems whose beams are known, each cloud with the root of its number of stems. Needs numpy.
+excess_radius_m to stems whose beams are known, each cloud with the root of its number of stems. --leave-out tells the
+errors of each cloud with the constants that the others give. It also tells the biases of clouds with eight stems and
+more. Needs numpy.
 """
 import io
 import sys
@@ -65,15 +67,19 @@ def fitted(terms, errors, groups):
     return best[1]
 
 
-def fit_radius(rows):
-    """kOneSided, kAllSides, kScatter and kNoise of excess_radius_m by robust least squares (Huber)."""
+def beam_terms(rows):
+    """Stems that tell the constants of excess_radius_m: rows, what is added up with them, and the excess of the radius."""
     rows = rows[(rows["beam_m"] > 0) & (np.abs(rows["dbh_m"] - rows["true_m"]) < 0.12)]
     radius = 0.5 * rows["dbh_m"]
     one_sided = np.maximum(0, 1 - rows["arc_deg"] / 360)
     noise = np.where(rows["noise_m"] > 0, rows["noise_m"], rows["scatter_m"])
     terms = np.stack([one_sided * rows["width_m"], rows["beam_m"],
                       -rows["beam_m"] * rows["scatter_m"] / np.maximum(radius, THIN_RADIUS), -one_sided * noise], 1)
-    excess = radius - 0.5 * rows["true_m"]
+    return rows, terms, radius - 0.5 * rows["true_m"]
+
+
+def beam_constants(rows, terms, excess):
+    """kOneSided, kAllSides, kScatter and kNoise of excess_radius_m by robust least squares (Huber)."""
     sds = np.sqrt((1.4 * rows["spread_m"]) ** 2 + 0.004 ** 2 + (1.5e-5 * rows["range_m"] ** 2) ** 2)
     _, cloud, number = np.unique(rows["cloud"], return_inverse=True, return_counts=True)
     found = np.zeros(4)
@@ -81,7 +87,30 @@ def fit_radius(rows):
         ratio = np.abs(excess - terms @ found) / sds
         weights = np.sqrt(np.minimum(1, 1.5 / np.maximum(ratio, 1e-9)) / sds ** 2 / np.sqrt(number[cloud]))
         found = np.linalg.lstsq(terms * weights[:, None], excess * weights, rcond=None)[0]
+    return found
+
+
+def fit_radius(rows):
+    rows, terms, excess = beam_terms(rows)
+    found = beam_constants(rows, terms, excess)
     print(f"excess_radius_m: kOneSided {found[0]:.2f}, kAllSides {found[1]:.2f}, kScatter {found[2]:.2f}, kNoise {found[3]:.2f}, from {len(rows)} stems")
+
+
+def leave_out(rows):
+    rows, terms, excess = beam_terms(rows)
+    error = np.zeros(len(rows))  # of the diameter, cm
+    for cloud in np.unique(rows["cloud"]):
+        rest = rows["cloud"] != cloud
+        found = beam_constants(rows[rest], terms[rest], excess[rest])
+        error[~rest] = 200 * (excess - terms @ found)[~rest]
+    thick = rows["true_m"] >= 0.10
+    print("\n| each cloud left out in turn | number | bias cm | RMSE cm | biases of clouds, RMS cm |\n|---|---|---|---|---|")
+    for name, inside in [("from 10 cm, to 8 m", thick & (rows["path_m"] < 8)),
+                         ("from 10 cm, 8 to 15 m", thick & (rows["path_m"] >= 8) & (rows["path_m"] < 15)),
+                         ("5 to 10 cm, to 15 m", ~thick & (rows["true_m"] >= 0.05) & (rows["path_m"] < 15))]:
+        clouds = [error[inside & (rows["cloud"] == cloud)] for cloud in np.unique(rows["cloud"])]
+        biases = [mine.mean() for mine in clouds if len(mine) >= 8]
+        print(f"| {name} | {inside.sum()} | {error[inside].mean():+.2f} | {np.sqrt(np.mean(error[inside] ** 2)):.2f} | {np.sqrt(np.mean(np.square(biases))):.2f} |")
 
 
 def tell(kind, rows, fit):
@@ -101,6 +130,8 @@ def main():
     rows = np.genfromtxt(io.StringIO(sys.stdin.read()), delimiter=",", names=True, dtype=None, encoding="utf-8")
     if "--fit-radius" in sys.argv:
         fit_radius(rows)
+    if "--leave-out" in sys.argv:
+        leave_out(rows)
     for kind in CONSTANTS:
         tell(kind, rows, "--fit" in sys.argv)
 

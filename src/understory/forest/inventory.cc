@@ -61,6 +61,12 @@ std::vector<Tree> trees_of(const InventoryResult& result, const std::vector<doub
   return trees;
 }
 
+// The radii with the sections at breast height. The search for stems compares those of whole stems.
+void take_section_radii(InventoryResult& result) {
+  for (StemFit& stem : result.stems)
+    if (stem.section_radius_m > 0.0) stem.radius_m = stem.section_radius_m;
+}
+
 // Takes away what wide beams add to the radii, and says how sure these are.
 void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3d>& scanner,
                       InventoryResult& result) {
@@ -418,6 +424,7 @@ InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& c
   result.points = gathered.points;
   result.slices = std::move(gathered.slices);
   result.stems = std::move(gathered.stems);
+  take_section_radii(result);
   compensate_beams(config.beam, scanner, result);
   result.thin = gathered.coverage.thin();
   measure_above(cloud, config, progress, {lookouts, scanner}, gathered, result);

@@ -36,6 +36,10 @@ TEST(Inventory, DiametersPositionsAndHeightsOfAStand) {
     EXPECT_NEAR(tree->lean_deg, std::atan(stem.lean_x) * 180.0 / M_PI, 0.8);
     EXPECT_NEAR(tree->height_m, 15.0, 0.7);
   }
+  for (std::size_t i = 0; i < result.stems.size(); ++i) {
+    EXPECT_GT(result.stems[i].section_radius_m, 0.0) << i;
+    EXPECT_EQ(result.trees[i].dbh_m, 2.0 * result.stems[i].section_radius_m) << i;
+  }
 }
 
 TEST(Inventory, AFullOneHasCurvesVolumesCrownsAndTheTreeOfEachPoint) {

@@ -14,9 +14,9 @@ inline constexpr double kSharedHeightSd = 0.3;
 // height. It holds where all tops of the plot are hidden, else in proportion to their share [tuned:
 // random seeds 4, 8, 9, 14, 16, handheld seed 3: -20 to +5 %]
 inline constexpr double kCurveBias = 0.1;
-// Share of the standard deviation of a diameter that all diameters of a stand have in common: what
-// the correction of wide beams and noise leaves at a site [tuned: the biases of 20 sites of random,
-// seeds in docs/method/forest-experiments.md, stand figures of long walks]
+// Share of the standard deviation of a diameter that all diameters of a stand have in common. It is
+// what the correction of wide beams and noise leaves at a site [tuned: the biases of 20 sites of
+// random, docs/method/forest-experiments.md, long walks]
 inline constexpr double kSharedDiameter = 0.4;
 }  // namespace stand_errors
 

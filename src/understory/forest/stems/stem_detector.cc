@@ -10,6 +10,7 @@
 #include "understory/forest/search/point_groups.h"
 #include "understory/forest/search/ring_linker.h"
 #include "understory/forest/stem_constants.h"
+#include "understory/forest/stems/breast_height_sections.h"
 #include "understory/forest/stems/not_a_tree.h"
 #include "understory/forest/stems/point_index.h"
 #include "understory/forest/stems/stem_criteria.h"
@@ -128,6 +129,7 @@ StemFit seen_from_above(StemFit stem, double rise_m) {
 StemFit seen_from_below(StemFit stem, double rise_m) {
   stem.centre -= rise_m * stem.slope;
   stem.radius_m -= rise_m * stem.taper;
+  if (stem.section_radius_m > 0.0) stem.section_radius_m -= rise_m * stem.taper;
   stem.below_sd_m = rise_m * kTaperSdBelow;
   stem.covariance(2, 2) += stem.below_sd_m * stem.below_sd_m;
   // The centre line's covariance grows with the square of the way to the foot.
@@ -181,8 +183,10 @@ StemFitResult fit_start(const Search& search, const StemFit& start, const SliceC
   if (plain || is_flat_column(fit, cut, config)) {
     fit = refine_stem(near, fit, config);
     fit.flat = !plain;
-    if (is_stem_still(fit, cut, config) && is_tree(fit.stem, search.index, search.points, config))
+    if (is_stem_still(fit, cut, config) && is_tree(fit.stem, search.index, search.points, config)) {
+      fit.stem.section_radius_m = radius_with_sections(near, fit.stem);
       return fit;
+    }
   }
   fit.converged = false;
   return fit;

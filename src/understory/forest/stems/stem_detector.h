@@ -54,8 +54,9 @@ struct StemFit {
   // x and y gain per metre of height.
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();
-  double radius_m = 0.0;  // at breast height
-  double taper = 0.0;     // of the radius per metre of height (negative: thinner upwards)
+  double radius_m = 0.0;          // at breast height
+  double section_radius_m = 0.0;  // with the sections there (radius_with_sections); 0: unknown
+  double taper = 0.0;             // of the radius per metre of height (negative: thinner upwards)
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();       // of centre x, y and radius
   Eigen::Matrix2d foot_covariance = Eigen::Matrix2d::Zero();  // of the centre line at the ground
   double spread_m = 0.0;    // of the radius, if returns were independent; see diameter_sd_m

@@ -1,0 +1,82 @@
+#include "understory/forest/stems/breast_height_sections.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "understory/forest/stem_curve_constants.h"
+#include "understory/forest/stems/arc_bins.h"
+#include "understory/forest/stems/noisy_cylinder.h"
+#include "understory/forest/stems/stem_axis.h"
+
+namespace understory {
+namespace {
+
+using namespace stem_constants::breast_height_sections;
+
+// The points of a section, with its height as breast height.
+std::vector<SlicePoint> points_of(const std::vector<SlicePoint>& points, const StemFit& stem,
+                                  double rise_m) {
+  std::vector<SlicePoint> section;
+  const StemAxis axis(stem);
+  for (const SlicePoint& point : points) {
+    const double height = static_cast<double>(point.height_m) - rise_m;
+    if (std::abs(height - kBreastHeight) > kHalfWindow) continue;
+    if (std::abs(axis.surface_error(point)) > kFitReach) continue;
+    SlicePoint moved = point;
+    moved.height_m = static_cast<float>(height);
+    section.push_back(moved);
+  }
+  return section;
+}
+
+// Degrees of its circumference that hold points.
+double arc_of(const std::vector<SlicePoint>& points, const NoisyCylinder& section) {
+  StemFit fit;
+  fit.centre = section.centre;
+  fit.slope = section.slope;
+  fit.radius_m = section.radius_m;
+  fit.taper = section.taper;
+  const double band = std::max(kBandScatters * section.scatter_m, kLeastBand);
+  const StemAxis axis(fit);
+  ArcBins arc;
+  for (const SlicePoint& point : points) {
+    const AxisPlace place = axis.place(point);
+    if (std::abs(axis.surface_error(place)) <= band) arc.add(place.outward.x(), place.outward.y());
+  }
+  return arc.covered_deg();
+}
+
+}  // namespace
+
+double radius_with_sections(const std::vector<SlicePoint>& points, const StemFit& stem) {
+  double weights = 0.0;
+  double sum = 0.0;
+  int sections = 0;
+  for (int k = -kSectionsBeside; k <= kSectionsBeside; ++k) {
+    const double rise = k * kStep;
+    const std::vector<SlicePoint> near = points_of(points, stem, rise);
+    if (near.size() < kFewestPoints) continue;
+    StemFit start = stem;
+    start.centre += rise * stem.slope;
+    start.radius_m += rise * stem.taper;
+    start.taper = kUsualTaper;
+    const NoisyCylinder found = fit_noisy_cylinder(near, start, {});
+    if (!found.converged || found.strays > kMostStrays) continue;
+    const double shift = (found.centre - start.centre).norm();
+    const double change = std::abs(found.radius_m - start.radius_m);
+    if (shift > kMostShift + kMostShiftShare * stem.radius_m ||
+        change > kMostChange + kMostChangeShare * stem.radius_m ||
+        arc_of(near, found) < kLeastArcShare * stem.arc_deg)
+      continue;
+    const double variance = found.covariance(4, 4) + kOwnSd * kOwnSd;
+    weights += 1.0 / variance;
+    sum += (found.radius_m - kUsualTaper * rise) / variance;
+    ++sections;
+  }
+  if (sections < kFewestSections) return stem.radius_m;
+  const double whole = kConeSd * kConeSd + kLinear * kLinear * stem.spread_m * stem.spread_m;
+  const double share = whole / (whole + kShared / weights);
+  return stem.radius_m + share * (sum / weights - stem.radius_m);
+}
+
+}  // namespace understory
