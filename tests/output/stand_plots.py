@@ -148,6 +148,30 @@ def check_benchmark_frame(folder):
         row = said.stdout.splitlines()[1].split(",")
         wanted = EAST + 1j * NORTH + ((15 + 12j) * scale * turn if place == turned else 15 + 12j)
         assert abs(complex(float(row[1]), float(row[2])) - wanted) < 0.01, (row, wanted)
+    check_benchmark_errors(folder, turned, trees, world)
+
+
+def check_benchmark_errors(folder, turned, trees, world):
+    """benchmarks/stand_table.py RUN TRUTH: plots.csv lies in the frame of trees.csv, not in that of the layers."""
+    places = [world[t["id"]] for t in trees]
+    middle = sum(places) / len(places)
+    radius = max(abs(place - middle) for place in places) + 1.0
+    with open(turned / "plots.csv", "w") as file:
+        names = ["stems_per_ha", "basal_area_m2_per_ha", "mean_dbh_m", "weighted_dbh_m", "weighted_height_m",
+                 "dominant_height_m", "volume_m3_per_ha"]
+        sds = ["stems_per_ha_sd", "basal_area_sd_m2_per_ha", "mean_dbh_sd_m", "weighted_dbh_sd_m", "weighted_height_sd_m",
+               "dominant_height_sd_m", "volume_sd_m3_per_ha"]
+        print("kind", "x", "y", "radius_m", "seen_share", *names, *sds, sep=",", file=file)
+        stems = 1.1 * len(trees) / (np.pi * radius ** 2 / 1e4)  # a tenth too many
+        print("circle", middle.real, middle.imag, radius, 1.0, stems, *[1.0] * 6, 0.05 * stems, *[1.0] * 6, sep=",", file=file)
+    truth = folder / "told"
+    truth.mkdir()
+    with open(truth / "trees.csv", "w") as file:
+        print("x,y,z,dbh_m,height_m,stem_volume_m3", file=file)
+        for place in places:
+            print(place.real, place.imag, 0.0, 0.2, 15.0, 0.3, sep=",", file=file)
+    said = subprocess.run([sys.executable, BENCHMARK, str(turned), str(truth)], capture_output=True, text=True, check=True)
+    assert "| stems_per_ha | 1 | +10.0 % | 10.0 % | 1.82 |" in said.stdout, said.stdout
 
 
 def main():
