@@ -39,6 +39,18 @@ TEST(YoungTrees, GreenToTheGroundAreListedByAFullInventory) {
     EXPECT_GE(tree.dbh_m, 0.05);
 }
 
+// A tree of 2.2 m is thinner than that.
+TEST(YoungTrees, DenseFoliageOfSeedlingsIsNoStem) {
+  TestPlot plot(10);
+  plot.add_ground(16.0, 60);
+  plot.add_stem({3.0, 3.0, 0.3});
+  plot.add_young_tree(6.0, 6.0, 0.05, 2.2);
+  plot.add_young_tree(11.0, 9.0, 0.05, 4.4, 5'000);
+  const InventoryResult full = take_inventory(blocks_of(plot.cloud), {});
+  EXPECT_EQ(full.trees.size(), 2U);
+  ASSERT_NE(nearest(full.trees, 11.0, 9.0), nullptr);
+}
+
 // Where the cloud was cut off, tops are not those of the trees.
 TEST(YoungTrees, OfACloudThatWasCutOffHaveNoHeight) {
   TestPlot plot(9);

@@ -56,6 +56,17 @@ TEST(BreastHeightSections, WhereTooFewAreSeenTheFitStands) {
   EXPECT_EQ(radius_with_sections({}, thin_fit()), thin_fit().radius_m);
 }
 
+// Of a stem that was seen all round, a section of one side tells less than the whole.
+TEST(BreastHeightSections, OfOneSideDoNotCountBesideAllSides) {
+  std::vector<SlicePoint> side = bowed(0.0, 0.3, 3.3);
+  std::erase_if(side, [](const SlicePoint& point) { return point.y > 0.03F; });
+  StemFit fit = thin_fit();
+  fit.arc_deg = 360.0;
+  EXPECT_EQ(radius_with_sections(side, fit), fit.radius_m);
+  fit.arc_deg = 200.0;
+  EXPECT_NE(radius_with_sections(side, fit), fit.radius_m);
+}
+
 // A section that is far off belongs to something else.
 TEST(BreastHeightSections, OfAnotherThingDoNotCount) {
   StemFit other = thin_fit();
