@@ -129,44 +129,30 @@ inline constexpr double kLeastTop = 2.0;
 }  // namespace stem_curve
 
 namespace breast_height_sections {  // forest/stems/breast_height_sections.cc
-// m between the sections [as in stem_curve]
-inline constexpr double kStep = 0.25;
-// m: half of the height of a section [as in stem_curve]
-inline constexpr double kHalfWindow = 0.3;
+// The sections are those of a stem curve.
+using stem_curve::kFewestPoints;
+using stem_curve::kFitReach;
+using stem_curve::kHalfWindow;
+using stem_curve::kLinear;
+using stem_curve::kMostChange;
+using stem_curve::kMostChangeShare;
+using stem_curve::kMostShift;
+using stem_curve::kMostShiftShare;
+using stem_curve::kMostStrays;
+using stem_curve::kStep;
+using stem_curve::kUsualTaper;
 // Sections above breast height, and as many below it [chosen]
 inline constexpr int kSectionsBeside = 2;
-// m/m: radius lost per metre of height [as in stem_fit]
-inline constexpr double kUsualTaper = -0.008;
-// m around the surface whose points enter a fit [as in stem_curve]
-inline constexpr double kFitReach = 0.1;
-// Points of a section at least [as in stem_curve]
-inline constexpr std::size_t kFewestPoints = 10;
-// Share of the points that belong to something else at most [as in stem_curve]
-inline constexpr double kMostStrays = 0.45;
-// m: shift of a section from the axis of the stem at most ... [as in stem_curve]
-inline constexpr double kMostShift = 0.03;
-// ... and radii, added [as in stem_curve]
-inline constexpr double kMostShiftShare = 0.2;
-// m: change of the radius at most ... [as in stem_curve]
-inline constexpr double kMostChange = 0.01;
-// ... and radii, added [as in stem_curve]
-inline constexpr double kMostChangeShare = 0.1;
-// Scatters: points so near to the surface are on it [as in stem_curve]
-inline constexpr double kBandScatters = 2.5;
-// m: the same at least [as in stem_curve]
-inline constexpr double kLeastBand = 0.015;
 // Of the arc that the whole stem shows, what a section shows at least [tuned on harvester seed 3
-// and the stems of kConeSd: 0.6 to 0.9]
+// and the stems of kConeSd: none, 0.75 and 0.9 were tried]
 inline constexpr double kLeastArcShare = 0.75;
 // m of a radius: what sections differ by beside their noise [chosen]
 inline constexpr double kOwnSd = 0.002;
 // Sections at least [chosen]
 inline constexpr int kFewestSections = 3;
-// m of the radius: what stems differ by from the cone of the whole fit [tuned: stem_sizes.py on the
-// stems that kOneSided is from, 0.002 to 0.005]
+// m of the radius: what stems differ by from the cone of the whole fit [tuned: 0.002 to 0.005, on
+// the maps of docs/method/forest-experiments.md, sections at breast height]
 inline constexpr double kConeSd = 0.003;
-// Times the fit's own error: returns are not independent [as in stem_fit]
-inline constexpr double kLinear = 1.5;
 // Sections that share their errors: they overlap [tuned with kConeSd: 1 to 6]
 inline constexpr double kShared = 3.0;
 }  // namespace breast_height_sections

@@ -1,11 +1,11 @@
 #include "understory/forest/stems/breast_height_sections.h"
 
-#include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "understory/forest/stem_curve_constants.h"
-#include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/noisy_cylinder.h"
+#include "understory/forest/stems/section_evidence.h"
 #include "understory/forest/stems/stem_axis.h"
 
 namespace understory {
@@ -29,21 +29,13 @@ std::vector<SlicePoint> points_of(const std::vector<SlicePoint>& points, const S
   return section;
 }
 
-// Degrees of its circumference that hold points.
-double arc_of(const std::vector<SlicePoint>& points, const NoisyCylinder& section) {
+StemFit fit_of(const NoisyCylinder& section) {
   StemFit fit;
   fit.centre = section.centre;
   fit.slope = section.slope;
   fit.radius_m = section.radius_m;
   fit.taper = section.taper;
-  const double band = std::max(kBandScatters * section.scatter_m, kLeastBand);
-  const StemAxis axis(fit);
-  ArcBins arc;
-  for (const SlicePoint& point : points) {
-    const AxisPlace place = axis.place(point);
-    if (std::abs(axis.surface_error(place)) <= band) arc.add(place.outward.x(), place.outward.y());
-  }
-  return arc.covered_deg();
+  return fit;
 }
 
 }  // namespace
@@ -55,7 +47,7 @@ double radius_with_sections(const std::vector<SlicePoint>& points, const StemFit
   for (int k = -kSectionsBeside; k <= kSectionsBeside; ++k) {
     const double rise = k * kStep;
     const std::vector<SlicePoint> near = points_of(points, stem, rise);
-    if (near.size() < kFewestPoints) continue;
+    if (near.size() < static_cast<std::size_t>(kFewestPoints)) continue;
     StemFit start = stem;
     start.centre += rise * stem.slope;
     start.radius_m += rise * stem.taper;
@@ -66,7 +58,8 @@ double radius_with_sections(const std::vector<SlicePoint>& points, const StemFit
     const double change = std::abs(found.radius_m - start.radius_m);
     if (shift > kMostShift + kMostShiftShare * stem.radius_m ||
         change > kMostChange + kMostChangeShare * stem.radius_m ||
-        arc_of(near, found) < kLeastArcShare * stem.arc_deg)
+        section_evidence(near, fit_of(found), found.scatter_m).arc_deg <
+            kLeastArcShare * stem.arc_deg)
       continue;
     const double variance = found.covariance(4, 4) + kOwnSd * kOwnSd;
     weights += 1.0 / variance;
