@@ -14,8 +14,8 @@ struct SectionEvidence {
   double seen_deg = 0.0;  // that was seen: all but the widest gap
 };
 
-// `fit`: the section; `scatter_m`: of its points about its surface. `points`: those of the window, with
-// the middle of the section as breast height.
+// `fit`: the section; `scatter_m`: of its points about its surface. `points`: those of the window,
+// with the middle of the section as breast height.
 [[nodiscard]] SectionEvidence section_evidence(const std::vector<SlicePoint>& points,
                                                const StemFit& fit, double scatter_m);
 
