@@ -10,7 +10,7 @@ import numpy as np
 ON_OBJECT_M = 0.35
 # A false stem beside a true tree that another one of the list is the same as (m).
 BESIDE_TREE_M = 1.0
-# A point of the map is one of the truth if their times are the same and they lie so near (m).
+# A point of the map is one of the truth if their times are the same (SAME_TIME) and they lie so near (m).
 SAME_POINT_M = 0.5
 # The top of a tree is seen where the truth has so many points in the half metre below it.
 TOP_M = 0.5
@@ -19,6 +19,9 @@ TOP_POINTS = 5
 MOST_POINTS = 200_000
 # Seconds of which a point's time is a whole number, for comparison.
 TICK_S = 1e-6
+# Times of the map are rounded: its time and that of the truth are the same if they differ by less (ticks). Columns of
+# a scan are 50 ticks and more apart.
+SAME_TIME = 20
 
 
 def things_of(folder):
@@ -66,6 +69,15 @@ def thinned(points):
     return tuple(part[::step] for part in points)
 
 
+def nearest_of(known, ticks):
+    """Each tick, or that of `known` (sorted) which is the same time."""
+    if len(known) < 2:
+        return ticks
+    after = np.clip(np.searchsorted(known, ticks), 1, len(known) - 1)
+    nearest = np.where(ticks - known[after - 1] < known[after] - ticks, known[after - 1], known[after])
+    return np.where(np.abs(nearest - ticks) < SAME_TIME, nearest, ticks)
+
+
 def true_trees_of(places, ticks, true_points):
     """The true tree of each point of a map, in the frame of the truth. It is that of the truth's nearest
     point of the same time; -1 where there is none."""
@@ -73,6 +85,7 @@ def true_trees_of(places, ticks, true_points):
     if (np.diff(true_ticks) < 0).any():
         order = np.argsort(true_ticks, kind="stable")
         true_places, true_ticks, true_ids = true_places[order], true_ticks[order], true_ids[order]
+    ticks = nearest_of(np.unique(true_ticks), ticks)
     begin = np.searchsorted(true_ticks, ticks, "left")
     count = np.searchsorted(true_ticks, ticks, "right") - begin
     best = np.full(len(ticks), SAME_POINT_M ** 2)

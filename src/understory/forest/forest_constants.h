@@ -295,8 +295,11 @@ inline constexpr double kOfReached = 0.45;
 namespace tree_owners {  // forest/trees/tree_owners.cc
 // m: edge of the cubes that a tree is made of [chosen]
 inline constexpr double kVoxel = 0.2;
-// Times the length of a way sideways: crowns are higher than wide [chosen]
-inline constexpr double kSideways = 1.5;
+// Times the length of a way sideways: crowns are higher than wide [tuned on `random` 1 to 6, 8, 13,
+// 16, 49 to 51 and 55 to 60: docs/method/forest-experiments.md, crowns]
+inline constexpr double kSideways = 3.0;
+// Cost of each metre of an axis above the measured part of its stem, metres [tuned likewise]
+inline constexpr double kAxisCost = 0.5;
 // Times the length of a way downwards: trees grow upwards [chosen]
 inline constexpr double kDownwards = 2.0;
 // m beyond the surface of a stem: cubes that are its own [chosen]
@@ -344,9 +347,16 @@ inline constexpr double kEdgeQuantile = 0.97;
 // Directions in which the reach of a whole crown is measured [tuned on `random` 1 to 6, 8, 13, 16,
 // 49 to 51 and 55 to 60: docs/method/forest-experiments.md, crowns]
 inline constexpr std::size_t kOutlineSectors = 24;
-// Of these, how many must have been seen at least. Of a crown that was seen from one side the
-// outline has less than half of the area [tuned likewise]
-inline constexpr std::size_t kFewestOutlineSectors = 21;
+// The edge of a crown begins at so much of the upper quartile of these reaches [tuned likewise]
+inline constexpr double kEdgeShare = 0.6;
+// Cubes that show the edge of a crown in a direction, at least [chosen]
+inline constexpr int kFewestEdgeCubes = 2;
+// Of the directions, how many must show the edge at least. Other crowns were seen from
+// one side, and their outline has 0.6 to 0.8 of their area [tuned likewise]
+inline constexpr int kFewestEdgeSectors = 15;
+// How much wider the gap between the outermost cubes and the edge of the crown is than it would be
+// if they were spread evenly: edges are thin [tuned likewise]
+inline constexpr double kThinEdge = 2.0;
 // Times the median of these: what reaches farther is of another tree [tuned likewise]
 inline constexpr double kStickingOut = 1.45;
 }  // namespace tree_crowns

@@ -81,6 +81,9 @@ double left_of(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::
   return along.x() * off.y() - along.y() * off.x();
 }
 
+// m2: three corners that span less lie on a line, but for rounding.
+constexpr double kOnALine = 1e-9;
+
 // The corners of one half of the convex outline of sorted places (A. M. Andrew, Information
 // Processing Letters 9(5), 1979).
 template <typename Iterator>
@@ -88,33 +91,69 @@ Places half_outline(Iterator begin, Iterator end) {
   Places corners;
   for (Iterator place = begin; place != end; ++place) {
     while (corners.size() > 1 &&
-           left_of(corners[corners.size() - 2], corners.back(), *place) <= 0.0)
+           left_of(corners[corners.size() - 2], corners.back(), *place) <= kOnALine)
       corners.pop_back();
     corners.push_back(*place);
   }
   return corners;
 }
 
-// The convex outline of the places, against the clock. Crowns are round: what sticks out far is a
-// branch of a neighbour. Empty where a crown was seen from one side only.
-PlaneRing convex_outline(const Places& places, const Eigen::Vector2d& middle) {
-  std::vector<double> seen;
-  for (const double reach : reaches_of<kOutlineSectors>(places, middle, 1.0)) {
-    if (reach >= 0.0) seen.push_back(reach);
+// The edge of a crown as its places show it, seen from its middle.
+struct CrownEdge {
+  int sectors = 0;      // that show it
+  double places = 0.0;  // of the edge, in the mean of all sectors
+};
+
+// Places beyond `most` are those of neighbours.
+CrownEdge edge_of(const Places& places, const Eigen::Vector2d& middle, double upper_quartile,
+                  double most) {
+  std::array<int, kOutlineSectors> seen{};
+  CrownEdge edge;
+  for (const Eigen::Vector2d& place : places) {
+    const Eigen::Vector2d off = place - middle;
+    const double reach = off.norm();
+    if (reach <= kEdgeShare * upper_quartile || reach > most) continue;
+    ++seen[sector_of<kOutlineSectors>(off)];
+    edge.places += 1.0 / kOutlineSectors;
   }
-  if (seen.size() < kFewestOutlineSectors) return {};
-  const double most = kStickingOut * upper_median(std::move(seen));
+  edge.sectors = static_cast<int>(
+      std::count_if(seen.begin(), seen.end(), [](int count) { return count >= kFewestEdgeCubes; }));
+  return edge;
+}
+
+// A crown seen from above, and how far it reaches beyond its outermost places.
+struct CrownOutline {
+  PlaneRing ring;
+  double beyond_m = 0.0;
+};
+
+// The convex outline of the places, against the clock. Crowns are round: what sticks out far is a
+// branch of a neighbour. Empty where a crown was seen from one side only. Few places leave a gap
+// to the edge: n of them that are spread over a width w reach to w / (n + 1) of it.
+CrownOutline convex_outline(const Places& places, const Eigen::Vector2d& middle) {
+  Reaches<kOutlineSectors> reaches = reaches_of<kOutlineSectors>(places, middle, 1.0);
+  std::sort(reaches.begin(), reaches.end());
+  const double upper_quartile = std::max(0.0, reaches[3 * kOutlineSectors / 4]);
+  std::vector<double> seen(std::upper_bound(reaches.begin(), reaches.end(), -0.5), reaches.end());
+  if (seen.empty()) return {};
+  const double usual = upper_median(std::move(seen));
+  const double most = kStickingOut * usual;
+  const CrownEdge edge = edge_of(places, middle, upper_quartile, most);
+  if (edge.sectors < kFewestEdgeSectors) return {};
+  const double beyond = kThinEdge * (1.0 - kEdgeShare) * usual / (edge.places + 1.0);
   Places within;
-  for (const Eigen::Vector2d& place : places)
-    if ((place - middle).norm() <= most) within.push_back(place);
+  for (const Eigen::Vector2d& place : places) {
+    const Eigen::Vector2d off = place - middle;
+    if (off.norm() <= most) within.emplace_back(place + beyond * off.normalized());
+  }
   std::sort(within.begin(), within.end(), [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
   });
   // The second half begins where the first one ends, and ends where that begins.
-  PlaneRing outline = half_outline(within.begin(), within.end());
+  PlaneRing ring = half_outline(within.begin(), within.end());
   const Places back = half_outline(within.rbegin(), within.rend());
-  if (back.size() > 2) outline.insert(outline.end(), back.begin() + 1, back.end() - 1);
-  return outline;
+  if (back.size() > 2) ring.insert(ring.end(), back.begin() + 1, back.end() - 1);
+  return {std::move(ring), beyond};
 }
 
 // The middle of a crown: half way from its stem to where its places are. Branches of neighbours
@@ -175,16 +214,18 @@ TreeCrown crown_of(const std::vector<TreeOwners::Voxel>& voxels, const OwnerTree
   if (base == widths.size()) return crown;
   crown.base_m = static_cast<double>(base) * kLayer;
   Places all;
-  double volume = 0.0;
-  for (std::size_t i = base; i < layers.size(); ++i) {
+  for (std::size_t i = base; i < layers.size(); ++i)
     all.insert(all.end(), layers[i].begin(), layers[i].end());
-    volume += kLayer * M_PI * widths[i] * widths[i];
-  }
   const double half_way = 0.5 * kLayer * static_cast<double>(base + layers.size());
-  crown.outline = convex_outline(all, middle_of(all, centre_at(tree, half_way)));
-  if (crown.outline.empty()) return crown;
+  CrownOutline outline = convex_outline(all, middle_of(all, centre_at(tree, half_way)));
+  if (outline.ring.empty()) return crown;
+  crown.outline = std::move(outline.ring);
   crown.area_m2 = std::abs(signed_area_m2(crown.outline));
-  crown.volume_m3 = volume;
+  crown.volume_m3 = 0.0;
+  for (std::size_t i = base; i < layers.size(); ++i) {
+    if (widths[i] > 0.0)
+      crown.volume_m3 += kLayer * M_PI * std::pow(widths[i] + outline.beyond_m, 2);
+  }
   return crown;
 }
 

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "understory/util/random.h"
+
 namespace understory {
 namespace {
 
@@ -68,6 +70,50 @@ TEST(TreeCrowns, BranchesOfANeighbourDoNotWidenTheOutline) {
   EXPECT_NEAR(measure_crowns(owners, trees)[0].area_m2, M_PI * 4.0, 0.16 * M_PI * 4.0);
 }
 
+// Two stems of one height, 3 m apart. The crown of the second begins below its measured part; that
+// of the first was measured to 3.5 m only. Ways from the stems alone would lead through the second
+// crown into the first.
+TEST(TreeCrowns, EachCrownIsAroundTheAxisOfItsTreeThoughOneStemWasMeasuredHigher) {
+  TreeOwners owners;
+  std::vector<OwnerTree> trees = {owner_tree(15.0), owner_tree(15.0)};
+  trees[1].seen_to_m = 10.0;
+  for (Eigen::Vector2d& centre : trees[1].centres)
+    centre.x() = 3.0;
+  for (double height = 0.3; height < 15.0; height += 0.1) {
+    for (const double x : {0.0, 3.0})
+      add_disc(owners, height < 8.0 ? 0.1 : 1.6, height, x);
+  }
+  owners.find(trees, {});
+  for (const double height : {9.0, 11.0, 13.0}) {
+    EXPECT_EQ(owners.owner({0.7, 0.0}, height), 0) << height;
+    EXPECT_EQ(owners.owner({2.3, 0.0}, height), 1) << height;
+  }
+  for (const TreeCrown& crown : measure_crowns(owners, trees))
+    EXPECT_NEAR(crown.area_m2, M_PI * 2.56, 0.25 * M_PI * 2.56);
+}
+
+// The same crown of fewer points is as large: what is missing at its edge is added.
+TEST(TreeCrowns, FewPointsMakeACrownNoSmaller) {
+  Random random(3);
+  double area[2] = {0.0, 0.0};
+  for (int k = 0; k < 2; ++k) {
+    TreeOwners owners;
+    for (double height = 0.3; height < 15.0; height += 0.1)
+      add_disc(owners, 0.1, height);
+    for (int i = 0; i < (k == 0 ? 40'000 : 250);) {
+      const Eigen::Vector2d place(random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0));
+      if (place.norm() > 2.0) continue;
+      owners.add(place, random.uniform(8.0, 15.0));
+      ++i;
+    }
+    const std::vector<OwnerTree> trees = {owner_tree(15.0)};
+    owners.find(trees, {});
+    area[k] = measure_crowns(owners, trees)[0].area_m2;
+    EXPECT_NEAR(area[k], M_PI * 4.0, 0.15 * M_PI * 4.0) << k;
+  }
+  EXPECT_GT(area[1], 0.95 * area[0]);
+}
+
 // Three quarters of a crown hide behind the rest.
 TEST(TreeCrowns, ACrownSeenFromOneSideHasABaseAndNoArea) {
   TreeOwners owners;
@@ -102,7 +148,7 @@ TEST(TreeCrowns, TheOutlineRunsAgainstTheClockRoundTheCrown) {
   ASSERT_GT(crown.outline.size(), 8U);
   for (std::size_t i = 0; i < crown.outline.size(); ++i) {
     const Eigen::Vector2d& corner = crown.outline[i];
-    EXPECT_NEAR(corner.norm(), 2.0, 0.15);
+    EXPECT_NEAR(corner.norm(), 2.0, 0.18);
     const Eigen::Vector2d& next = crown.outline[(i + 1) % crown.outline.size()];
     const Eigen::Vector2d ahead = crown.outline[(i + 2) % crown.outline.size()] - next;
     const Eigen::Vector2d along = next - corner;

@@ -60,6 +60,11 @@ struct Reached {
   std::int32_t owner = TreeOwners::kNobody;
 };
 
+// How high a tree is.
+double top_of(const OwnerTree& tree) {
+  return std::isfinite(tree.height_m) ? tree.height_m : kUsualHeight;
+}
+
 // Whether a tree is near enough to a cube.
 bool may_own(const std::vector<OwnerTree>& trees, std::int32_t owner, std::uint64_t key,
              double size_m) {
@@ -69,7 +74,7 @@ bool may_own(const std::vector<OwnerTree>& trees, std::int32_t owner, std::uint6
     return (static_cast<double>(number) + 0.5) * size_m;
   };
   const double height = middle(cube.z);
-  const double top = std::isfinite(tree.height_m) ? tree.height_m : kUsualHeight;
+  const double top = top_of(tree);
   if (std::isfinite(tree.height_m) && height > top + kOverTop) return false;
   const double reach = height < kUndergrowth
                            ? tree.radius_m + kStemReach
@@ -150,19 +155,21 @@ class WayGrid {
       open_;
 };
 
-// The cubes at the measured part of each stem.
+// The cubes at the measured part of each stem, and those at its axis above.
 void seed_stems(const std::vector<OwnerTree>& trees, WayGrid& grid, std::size_t count) {
   for (std::size_t t = 0; t < trees.size(); ++t) {
     const OwnerTree& tree = trees[t];
     const double reach = tree.radius_m + kSeedReach;
-    for (double height = 0.5 * kVoxel; height < tree.seen_to_m + kVoxel; height += kVoxel) {
+    const double end = std::max(tree.seen_to_m, top_of(tree)) + kVoxel;
+    for (double height = 0.5 * kVoxel; height < end; height += kVoxel) {
+      const double above_stem = kAxisCost * std::max(0.0, height - tree.seen_to_m);
       const Eigen::Vector2d centre = centre_at(tree, height);
       for (double y = centre.y() - reach; y < centre.y() + reach + kVoxel; y += kVoxel) {
         for (double x = centre.x() - reach; x < centre.x() + reach + kVoxel; x += kVoxel) {
           const double off = (Eigen::Vector2d(x, y) - centre).norm();
           const std::size_t i = grid.index_of(packed(cube_at({x, y}, height)));
           if (i < count && off < reach)
-            grid.seed(i, {static_cast<float>(off), static_cast<std::int32_t>(t)});
+            grid.seed(i, {static_cast<float>(off + above_stem), static_cast<std::int32_t>(t)});
         }
       }
     }

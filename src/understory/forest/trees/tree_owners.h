@@ -41,6 +41,7 @@ class TreeOwners {
 
   // Gives each cube to the tree whose stem is nearest along a way through cubes that hold points
   // (Dijkstra from all stems at once). Sideways and downwards ways count more than upwards ones.
+  // Above the measured part of a stem, ways begin at its axis too, at a cost that grows upwards.
   // Gaps of up to three cubes are crossed where no way leads. Nothing far from all trees has an
   // owner, nor what stands beside a stem near the ground. Deterministic. Polls `progress`.
   void find(const std::vector<OwnerTree>& trees, const ProgressSink& progress = {});
