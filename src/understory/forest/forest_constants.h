@@ -351,11 +351,11 @@ inline constexpr std::size_t kOutlineSectors = 24;
 inline constexpr double kEdgeShare = 0.6;
 // Cubes that show the edge of a crown in a direction, at least [chosen]
 inline constexpr int kFewestEdgeCubes = 2;
-// Of the directions, how many must show the edge at least. Other crowns were seen from
-// one side, and their outline has 0.6 to 0.8 of their area [tuned likewise]
+// Of the directions, how many must show the edge at least. Other crowns were seen from one side,
+// and their outline has 0.6 to 0.8 of their area [tuned likewise]
 inline constexpr int kFewestEdgeSectors = 15;
-// How much wider the gap between the outermost cubes and the edge of the crown is than it would be
-// if they were spread evenly: edges are thin [tuned likewise]
+// Times the gap to the edge of the crown that evenly spread cubes leave: edges are thin [tuned
+// likewise]
 inline constexpr double kThinEdge = 2.0;
 // Times the median of these: what reaches farther is of another tree [tuned likewise]
 inline constexpr double kStickingOut = 1.45;

@@ -129,7 +129,7 @@ struct CrownOutline {
 
 // The convex outline of the places, against the clock. Crowns are round: what sticks out far is a
 // branch of a neighbour. Empty where a crown was seen from one side only. Few places leave a gap
-// to the edge: n of them that are spread over a width w reach to w / (n + 1) of it.
+// to the edge, which is added: n of them that are spread evenly over a width w leave w / (n + 1).
 CrownOutline convex_outline(const Places& places, const Eigen::Vector2d& middle) {
   Reaches<kOutlineSectors> reaches = reaches_of<kOutlineSectors>(places, middle, 1.0);
   std::sort(reaches.begin(), reaches.end());

@@ -21,7 +21,7 @@ struct TreeCrown {
 
 // Base, area and volume of each crown. The area is that of the convex outline, without what sticks
 // out far. The outlines of the layers are made of sixteen wedges. Nearly all cubes of each of
-// sixteen directions lie within.
+// sixteen directions lie within. What few cubes miss of the edge is added to both.
 [[nodiscard]] std::vector<TreeCrown> measure_crowns(const TreeOwners& owners,
                                                     const std::vector<OwnerTree>& trees);
 
