@@ -120,16 +120,23 @@ def check_cloud(folder, truth, points):
 
 
 def check_crowns(folder, truth):
-    known = 0
+    """Crowns with a base, and those with an area: seen from all sides. Areas are those of the truth."""
+    bases, ratios = 0, []
     for tree, grown in pairs(folder, truth):
         if not tree["crown_base_m"] or not tree["height_m"]:
             continue
-        known += 1
-        base, area, volume, top = (float(tree[name]) for name in ("crown_base_m", "crown_area_m2", "crown_volume_m3", "height_m"))
-        assert 0.0 <= base < top and 0.1 < area < 60.0, tree
-        assert 0.0 < volume < area * (top - base) + 1.0, tree
-    assert known >= 15, known
-    return known
+        bases += 1
+        base, top = float(tree["crown_base_m"]), float(tree["height_m"])
+        assert 0.0 <= base < top, tree
+        assert bool(tree["crown_area_m2"]) == bool(tree["crown_volume_m3"]), tree
+        if not tree["crown_area_m2"]:
+            continue
+        area, volume = float(tree["crown_area_m2"]), float(tree["crown_volume_m3"])
+        assert 0.1 < area < 60.0 and 0.0 < volume < area * (top - base) + 1.0, tree
+        if grown["crown_area_m2"]:
+            ratios.append(area / float(grown["crown_area_m2"]))
+    assert bases >= 15 and len(ratios) >= 8 and 0.7 < np.median(ratios) < 1.3, (bases, ratios)
+    return bases, len(ratios), float(np.median(ratios))
 
 
 def check_foreign_clouds(run_map, folder):
@@ -169,7 +176,7 @@ def main():
         points = json.loads((folder / "run/run.json").read_text())["counts"]["map_points"]
         print("map: RMSE of sections %.4f m, bias of the volume %+.3f" % check_curves(folder / "run", truth))
         print("map: points of stems right and wrong", *check_cloud(folder / "run", truth, points))
-        print("map: crowns", check_crowns(folder / "run", truth))
+        print("map: crowns, those with an area, median ratio to the truth", *check_crowns(folder / "run", truth))
         with sqlite3.connect(folder / "run/trees.gpkg") as layer:
             assert layer.execute("select count(*) from trees where stem_volume_m3 > 0").fetchone()[0] > 15
 
