@@ -70,10 +70,9 @@ TEST(TreeCrowns, BranchesOfANeighbourDoNotWidenTheOutline) {
   EXPECT_NEAR(measure_crowns(owners, trees)[0].area_m2, M_PI * 4.0, 0.16 * M_PI * 4.0);
 }
 
-// Two stems of one height, 3 m apart. The crown of the second begins below its measured part; that
-// of the first was measured to 3.5 m only. Ways from the stems alone would lead through the second
-// crown into the first.
-TEST(TreeCrowns, EachCrownIsAroundTheAxisOfItsTreeThoughOneStemWasMeasuredHigher) {
+// Two trees of one height, 3 m apart, whose crowns touch. One stem was measured into its crown, the
+// other one far below. By ways from the measured stems alone, the first tree has both crowns.
+TEST(TreeCrowns, ATreeWhoseStemWasSeenLowKeepsTheCrownAroundItsAxis) {
   TreeOwners owners;
   std::vector<OwnerTree> trees = {owner_tree(15.0), owner_tree(15.0)};
   trees[1].seen_to_m = 10.0;
