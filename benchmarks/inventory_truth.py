@@ -12,6 +12,8 @@ ON_OBJECT_M = 0.35
 BESIDE_TREE_M = 1.0
 # A point of the map is one of the truth if their times are the same (SAME_TIME) and they lie so near (m).
 SAME_POINT_M = 0.5
+# The same before the map's offset is known (m).
+ROUGH_POINT_M = 3.0
 # The top of a tree is seen where the truth has so many points in the half metre below it.
 TOP_M = 0.5
 TOP_POINTS = 5
@@ -19,9 +21,8 @@ TOP_POINTS = 5
 MOST_POINTS = 200_000
 # Seconds of which a point's time is a whole number, for comparison.
 TICK_S = 1e-6
-# Times of the map are rounded: its time and that of the truth are the same if they differ by less (ticks). Columns of
-# a scan are 50 ticks and more apart.
-SAME_TIME = 20
+# Times of the map are rounded to 10 ticks: its time and that of the truth are the same if they differ by so much at most.
+SAME_TIME = 11
 
 
 def things_of(folder):
@@ -69,26 +70,12 @@ def thinned(points):
     return tuple(part[::step] for part in points)
 
 
-def nearest_of(known, ticks):
-    """Each tick, or that of `known` (sorted) which is the same time."""
-    if len(known) < 2:
-        return ticks
-    after = np.clip(np.searchsorted(known, ticks), 1, len(known) - 1)
-    nearest = np.where(ticks - known[after - 1] < known[after] - ticks, known[after - 1], known[after])
-    return np.where(np.abs(nearest - ticks) < SAME_TIME, nearest, ticks)
-
-
-def true_trees_of(places, ticks, true_points):
-    """The true tree of each point of a map, in the frame of the truth. It is that of the truth's nearest
-    point of the same time; -1 where there is none."""
-    true_places, true_ticks, true_ids = true_points
-    if (np.diff(true_ticks) < 0).any():
-        order = np.argsort(true_ticks, kind="stable")
-        true_places, true_ticks, true_ids = true_places[order], true_ticks[order], true_ids[order]
-    ticks = nearest_of(np.unique(true_ticks), ticks)
-    begin = np.searchsorted(true_ticks, ticks, "left")
-    count = np.searchsorted(true_ticks, ticks, "right") - begin
-    best = np.full(len(ticks), SAME_POINT_M ** 2)
+def nearest_at_its_time(places, ticks, true_points, reach_m):
+    """Index of the truth's nearest point of the same time, within reach; -1 where there is none. The truth is sorted by time."""
+    true_places, true_ticks, _ = true_points
+    begin = np.searchsorted(true_ticks, ticks - SAME_TIME, "left")
+    count = np.searchsorted(true_ticks, ticks + SAME_TIME, "right") - begin
+    best = np.full(len(ticks), reach_m ** 2)
     found = np.full(len(ticks), -1, dtype=np.int64)
     for step in range(int(count.max(initial=0))):
         some = np.flatnonzero(count > step)
@@ -96,8 +83,22 @@ def true_trees_of(places, ticks, true_points):
         squared = ((places[some] - true_places[there]) ** 2).sum(axis=1)
         nearer = squared < best[some]
         best[some[nearer]] = squared[nearer]
-        found[some[nearer]] = true_ids[there[nearer]]
+        found[some[nearer]] = there[nearer]
     return found
+
+
+def true_trees_of(places, ticks, true_points):
+    """The true tree of each point of a map in the frame of the truth; -1 where there is none. The feet of the trees lay
+    the map on the truth, and the ground around them may be seen too high. So the median offset is taken off first."""
+    if (np.diff(true_points[1]) < 0).any():
+        order = np.argsort(true_points[1], kind="stable")
+        true_points = tuple(part[order] for part in true_points)
+    rough = nearest_at_its_time(places, ticks, true_points, ROUGH_POINT_M)
+    if not (rough >= 0).any():
+        return rough
+    offset = np.median(places[rough >= 0] - true_points[0][rough[rough >= 0]], axis=0)
+    found = nearest_at_its_time(places - offset, ticks, true_points, SAME_POINT_M)
+    return np.where(found >= 0, true_points[2][found], -1)
 
 
 def tops_seen(true_points, ids, tops_z):
