@@ -21,7 +21,7 @@ TOP_POINTS = 5
 MOST_POINTS = 200_000
 # Seconds of which a point's time is a whole number, for comparison.
 TICK_S = 1e-6
-# Times of the map are rounded to 10 ticks: its time and that of the truth are the same if they differ by so much at most.
+# Ticks by which two times of the same point differ at most: the map rounds its times to 10 ticks.
 SAME_TIME = 11
 
 
