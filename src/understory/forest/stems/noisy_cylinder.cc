@@ -129,32 +129,25 @@ class Estimator {
   // Places on the circumference, near enough to each other that the scatter blurs the gaps.
   void spread_bins() {
     const double wanted = 2.0 * M_PI * radius_ / (kBinScatters * scatter_);
-    const auto count = static_cast<std::size_t>(std::clamp(wanted, kFewestBins, kMostBins));
-    visible_.assign(count, 1.0 / static_cast<double>(count));
-    views_.assign(kViews, 1.0 / kViews);
-    lobes_.assign(kViews, std::vector<double>(count));
-    for (std::size_t b = 0; b < count; ++b) {
-      const double turn = 2.0 * M_PI * (static_cast<double>(b) + 0.5) / static_cast<double>(count);
-      outward_.emplace_back(std::cos(turn), std::sin(turn));
+    const auto count = static_cast<Eigen::Index>(std::clamp(wanted, kFewestBins, kMostBins));
+    visible_ = Eigen::ArrayXd::Constant(count, 1.0 / static_cast<double>(count));
+    views_ = Eigen::VectorXd::Constant(kViews, 1.0 / kViews);
+    const Eigen::Index padded = 2 * count + kVector;
+    for (Eigen::ArrayXd* all : {&outward_x_, &outward_y_, &shares_, &squares_})
+      *all = Eigen::ArrayXd::Zero(padded);
+    for (Eigen::Index b = 0; b < 2 * count; ++b) {
+      const double turn =
+          2.0 * M_PI * (static_cast<double>(b % count) + 0.5) / static_cast<double>(count);
+      outward_x_[b] = std::cos(turn);
+      outward_y_[b] = std::sin(turn);
     }
-    for (std::size_t b = 0; b < count; ++b)
-      outward_.push_back(outward_[b]);
-    for (const Eigen::Vector2d& outward : outward_) {
-      outward_x_.push_back(outward.x());
-      outward_y_.push_back(outward.y());
-    }
-    const std::size_t padded = outward_.size() + kVector;
-    for (std::vector<double>* all : {&outward_x_, &outward_y_, &shares_, &squares_})
-      all->resize(padded);
+    lobes_.resize(count, kViews);
     for (int k = 0; k < kViews; ++k) {
       const double turn = 2.0 * M_PI * k / kViews;
-      const Eigen::Vector2d towards(std::cos(turn), std::sin(turn));
-      std::vector<double>& lobe = lobes_[static_cast<std::size_t>(k)];
-      double sum = 0.0;
-      for (std::size_t b = 0; b < count; ++b)
-        sum += lobe[b] = std::max(0.0, outward_[b].dot(towards));
-      for (double& share : lobe)
-        share /= sum;
+      lobes_.col(k) =
+          (std::cos(turn) * outward_x_.head(count) + std::sin(turn) * outward_y_.head(count))
+              .max(0.0);
+      lobes_.col(k) /= lobes_.col(k).sum();
     }
   }
 
@@ -195,7 +188,7 @@ class Estimator {
       shares[b] *= visible[begin + b - count];
   }
 
-  void add_point(const FlatPoint& point, Sums& sums, std::vector<double>& seen) {
+  void add_point(const FlatPoint& point, Sums& sums, Eigen::ArrayXd& seen) {
     const Eigen::Vector2d q = point.place - centre_ - point.rise * slope_;
     const double r = radius_ + taper_ * point.rise;
     const double inverse = 1.0 / (scatter_ * scatter_);
@@ -212,23 +205,20 @@ class Estimator {
     const int begin = ((first % count) + count) % count;
     const int end = begin + last - first + 1;
     find_shares(begin, end, q, r, inverse);
-    double density = 0.0;
-    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-    double square = 0.0;
-    for (int b = begin; b < end; ++b) {
-      const auto i = static_cast<std::size_t>(b);
-      density += shares_[i];
-      mean += shares_[i] * outward_[i];
-      square += shares_[i] * squares_[i];
-    }
+    const Eigen::Index n = end - begin;
+    const auto shares = shares_.segment(begin, n);
+    const double density = shares.sum();
+    const Eigen::Vector2d mean((shares * outward_x_.segment(begin, n)).sum(),
+                               (shares * outward_y_.segment(begin, n)).sum());
+    const double square = (shares * squares_.segment(begin, n)).sum();
     const double scale = (1.0 - strays_) * inverse / (2.0 * M_PI);
     const double all = scale * density + strays_ * stray_density_;
     const double w = point.weight * scale / all;
     sums.log_likelihood += point.weight * std::log(all);
     sums.square += w * square;
-    for (int b = begin; b < end; ++b)
-      seen[static_cast<std::size_t>(b < count ? b : b - count)] +=
-          w * shares_[static_cast<std::size_t>(b)];
+    const Eigen::Index turn = std::min(end, count) - begin;
+    seen.segment(begin, turn) += w * shares.head(turn);
+    seen.head(n - turn) += w * shares.tail(n - turn);
     add_to_system(point, w * density, w * mean, sums);
   }
 
@@ -258,7 +248,7 @@ class Estimator {
 
   bool step(NoisyCylinder& result) {
     Sums sums;
-    std::vector<double> seen(visible_.size(), 0.0);
+    Eigen::ArrayXd seen = Eigen::ArrayXd::Zero(visible_.size());
     for (const FlatPoint& point : flat_)
       add_point(point, sums, seen);
     if (sums.weight < std::min(kLeastWeight, 1.0 - config_.most_strays) * total_) return false;
@@ -291,21 +281,12 @@ class Estimator {
   // Beams from one direction fall evenly over the stem's width. So they hit places in proportion to
   // the cosine of their angle to it, and none beyond a right angle. What is seen is a sum of such
   // lobes. That ties the radius to the width seen where the side away from the scanner is unknown.
-  void learn_views(const std::vector<double>& seen) {
+  void learn_views(const Eigen::ArrayXd& seen) {
     for (int round = 0; round < kViewRounds; ++round) {
-      double sum = 0.0;
-      for (std::size_t k = 0; k < views_.size(); ++k) {
-        double gain = 0.0;
-        for (std::size_t b = 0; b < seen.size(); ++b)
-          gain += visible_[b] > 1e-12 ? lobes_[k][b] * seen[b] / visible_[b] : 0.0;
-        sum += views_[k] *= gain;
-      }
-      std::fill(visible_.begin(), visible_.end(), 0.0);
-      for (std::size_t k = 0; k < views_.size(); ++k) {
-        views_[k] = std::max(kLeastView, views_[k] / sum);
-        for (std::size_t b = 0; b < visible_.size(); ++b)
-          visible_[b] += views_[k] * lobes_[k][b];
-      }
+      const Eigen::ArrayXd ratio = (visible_ > 1e-12).select(seen / visible_, 0.0);
+      views_.array() *= (lobes_.transpose() * ratio.matrix()).array();
+      views_ = (views_.array() / views_.sum()).max(kLeastView);
+      visible_ = (lobes_ * views_).array();
     }
   }
 
@@ -322,15 +303,14 @@ class Estimator {
   double scatter_ = 0.0;
   double strays_ = kFirstStrays;
   double stray_density_ = 1.0;
-  std::vector<double> visible_;           // share of the returns that come from each place
-  std::vector<Eigen::Vector2d> outward_;  // of the places, twice round
-  std::vector<double> outward_x_;         // the same, for vectors
-  std::vector<double> outward_y_;
-  std::vector<double> views_;               // share of the returns from each direction
-  std::vector<std::vector<double>> lobes_;  // what each direction sees of each place
-  // Of a point, along `outward_`: chance that it came from there, and squared distance.
-  std::vector<double> shares_;
-  std::vector<double> squares_;
+  Eigen::ArrayXd visible_;    // share of the returns that come from each place
+  Eigen::ArrayXd outward_x_;  // directions of the places, twice round
+  Eigen::ArrayXd outward_y_;
+  Eigen::VectorXd views_;  // share of the returns from each direction
+  Eigen::MatrixXd lobes_;  // what each direction (column) sees of each place (row)
+  // Of a point, along `outward_x_`: chance that it came from there, and squared distance.
+  Eigen::ArrayXd shares_;
+  Eigen::ArrayXd squares_;
 };
 
 }  // namespace

@@ -66,10 +66,18 @@ bool same_stem(const StemFit& a, const StemFit& b) {
          std::max(kSameOfBoth * (larger + smaller), larger + kSameOfSmaller * smaller);
 }
 
+// A fit, and the points that it was made of where sections at breast height are to be fitted.
+struct StemCandidate {
+  StemFitResult fit;
+  std::vector<SlicePoint> near;
+};
+
 // Those whose radius the first fit told, then by support: many returns, evenly on the parts that
 // were seen.
-void sort_by_support(std::vector<StemFitResult>& fits) {
-  sort_stably(fits, [](const StemFitResult& a, const StemFitResult& b) {
+void sort_by_support(std::vector<StemCandidate>& fits) {
+  sort_stably(fits, [](const StemCandidate& first, const StemCandidate& second) {
+    const StemFitResult& a = first.fit;
+    const StemFitResult& b = second.fit;
     if (a.flat != b.flat) return b.flat;
     const double qa = a.evidence.patches * a.evidence.fill;
     const double qb = b.evidence.patches * b.evidence.fill;
@@ -175,33 +183,31 @@ std::vector<SlicePoint> unexplained_near(const Search& search, const StemFit& st
 }
 
 // A fit that is a stem by itself, or has not converged.
-StemFitResult fit_start(const Search& search, const StemFit& start, const SliceCut& cut,
+StemCandidate fit_start(const Search& search, const StemFit& start, const SliceCut& cut,
                         const StemDetectorConfig& config) {
-  const std::vector<SlicePoint> near = unexplained_near(search, start, config);
+  std::vector<SlicePoint> near = unexplained_near(search, start, config);
   StemFitResult fit = fit_stem(near, start, config);
   const bool plain = is_stem(fit, cut, config);
   if (plain || is_flat_column(fit, cut, config)) {
     fit = refine_stem(near, fit, config);
     fit.flat = !plain;
-    if (is_stem_still(fit, cut, config) && is_tree(fit.stem, search.index, search.points, config)) {
-      fit.stem.section_radius_m = radius_with_sections(near, fit.stem);
-      return fit;
-    }
+    if (is_stem_still(fit, cut, config) && is_tree(fit.stem, search.index, search.points, config))
+      return {fit, std::move(near)};
   }
   fit.converged = false;
-  return fit;
+  return {fit, {}};
 }
 
 // Fits of all starts by `fit`, without those that are no stems.
 template <typename Fit>
-std::vector<StemFitResult> fit_all(const std::vector<StemFit>& starts, const ProgressSink& progress,
+std::vector<StemCandidate> fit_all(const std::vector<StemFit>& starts, const ProgressSink& progress,
                                    const Fit& fit) {
-  std::vector<StemFitResult> fits(starts.size());
+  std::vector<StemCandidate> fits(starts.size());
   parallel_for(starts.size(), 1, [&](std::size_t i) {
     progress.poll();
     fits[i] = fit(starts[i]);
   });
-  std::erase_if(fits, [](const StemFitResult& result) { return !result.converged; });
+  std::erase_if(fits, [](const StemCandidate& result) { return !result.fit.converged; });
   return fits;
 }
 
@@ -215,10 +221,14 @@ bool is_foliage_stem(const StemFitResult& fit, const std::vector<SlicePoint>& ne
          stands_in_foliage(near, stem) && is_tree(stem, search.index, search.points, config);
 }
 
-// Adds what no better stem explains.
-void add_unclaimed(const std::vector<StemFitResult>& fits, const StemDetectorConfig& config,
+// Adds what no better stem explains. Only these stems get sections: most stems were fitted several
+// times.
+void add_unclaimed(std::vector<StemCandidate> fits, const StemDetectorConfig& config,
                    Search& search) {
-  for (const StemFitResult& fit : fits) {
+  const std::size_t known = search.stems.size();
+  std::vector<std::vector<SlicePoint>> near;
+  for (StemCandidate& candidate : fits) {
+    const StemFitResult& fit = candidate.fit;
     const auto overlaps = [&](const StemFit& other) { return same_stem(fit.stem, other); };
     if (std::any_of(search.stems.begin(), search.stems.end(), overlaps)) continue;
     // A stem beside another must not live on the other's points.
@@ -227,23 +237,28 @@ void add_unclaimed(const std::vector<StemFitResult>& fits, const StemDetectorCon
       continue;
     }
     search.know(fit.stem);
+    near.push_back(std::move(candidate.near));
   }
+  parallel_for(near.size(), 1, [&](std::size_t i) {
+    StemFit& stem = search.stems[known + i];
+    if (!near[i].empty()) stem.section_radius_m = radius_with_sections(near[i], stem);
+  });
 }
 
 // A fit to a thin column that is a stem thinner than `most_m`, or has not converged. It stands
 // clear or within foliage.
-StemFitResult fit_column(const Search& search, const StemFit& column, double most_m,
+StemCandidate fit_column(const Search& search, const StemFit& column, double most_m,
                          const StemDetectorConfig& config) {
   const auto is_thinner = [&](const StemFitResult& fit) {
     return fit.converged && 2.0 * fit.stem.radius_m < most_m;
   };
-  StemFitResult clear = fit_start(search, column, cut_of(StemCut::kThin, config), config);
-  if (is_thinner(clear)) return clear;
+  StemCandidate clear = fit_start(search, column, cut_of(StemCut::kThin, config), config);
+  if (is_thinner(clear.fit)) return clear;
   const std::vector<SlicePoint> near = unexplained_near(search, column, config);
   StemFitResult fit = fit_in_foliage(near, column, config);
   fit.stem.in_foliage = true;
   fit.converged = is_thinner(fit) && is_foliage_stem(fit, near, search, config);
-  return fit;
+  return {fit, {}};
 }
 
 // Stems of config.min_dbh_m and more, but thinner than `most_m`, that show as thin columns.
@@ -251,10 +266,11 @@ void add_thin_stems(double most_m, const StemDetectorConfig& config, const StemS
                     const ProgressSink& progress, Search& search) {
   const std::vector<StemFit> columns =
       find_foliage_columns(search.points, search.explained, config, where, progress);
-  const std::vector<StemFitResult> fits = fit_all(columns, progress, [&](const StemFit& column) {
-    return fit_column(search, column, most_m, config);
-  });
-  add_unclaimed(fits, config, search);
+  add_unclaimed(fit_all(columns, progress,
+                        [&](const StemFit& column) {
+                          return fit_column(search, column, most_m, config);
+                        }),
+                config, search);
 }
 
 void add_foliage_stems(const StemDetectorConfig& config, const StemSearchArea& where,
@@ -277,11 +293,11 @@ void add_stems(const SliceCut& cut, const StemDetectorConfig& config, const Stem
   std::vector<StemFit> starts = link_rings(rings, cut.min_slices, config.max_lean_deg);
   const GroundArea fitted = where.area.grown(kFitsBeyond);
   std::erase_if(starts, [&](const StemFit& start) { return !fitted.contains(start.centre); });
-  std::vector<StemFitResult> fits = fit_all(starts, progress, [&](const StemFit& start) {
+  std::vector<StemCandidate> fits = fit_all(starts, progress, [&](const StemFit& start) {
     return fit_start(search, start, cut, config);
   });
   sort_by_support(fits);
-  add_unclaimed(fits, config, search);
+  add_unclaimed(std::move(fits), config, search);
 }
 
 }  // namespace
