@@ -108,59 +108,57 @@ std::vector<char> cells_around_known(const Raster& grid, int rings) {
   return around;
 }
 
-// Heights of the `wanted` cells from the known ones around, ring by ring until none is left. Each
-// is the mean of its eight neighbours, weighted by distance. Then a light smoothing of the filled
-// cells only, for gaps of `rings` cells. `no_higher`: the lowest return of cells that have no
-// ground, NaN elsewhere.
+// Mean of the eight neighbours of a cell, weighted by distance; NaN if none of them is known.
+float mean_around(const Raster& grid, std::size_t cell) {
+  const int row = static_cast<int>(cell / static_cast<std::size_t>(grid.columns));
+  const int column = static_cast<int>(cell % static_cast<std::size_t>(grid.columns));
+  float sum = 0.0F;
+  float weights = 0.0F;
+  for (int j = -1; j <= 1; ++j) {
+    for (int i = -1; i <= 1; ++i) {
+      if ((i == 0 && j == 0) || !grid.contains(column + i, row + j)) continue;
+      const float z = grid.values[grid.index(column + i, row + j)];
+      if (!std::isfinite(z)) continue;
+      const float weight = i == 0 || j == 0 ? 1.0F : 0.5F;
+      sum += weight * z;
+      weights += weight;
+    }
+  }
+  return weights > 0.0F ? sum / weights : kNan;
+}
+
+// Heights of the `wanted` cells from the known ones around, ring by ring until none is left. Then a
+// light smoothing of the filled cells only, for gaps of `rings` cells. `no_higher`: the lowest
+// return of cells that have no ground, NaN elsewhere.
 void fill_gaps(Raster& grid, int rings, const std::vector<char>& wanted,
                const std::vector<float>& no_higher) {
-  std::vector<char> known(grid.values.size());
-  for (std::size_t i = 0; i < known.size(); ++i)
-    known[i] = std::isfinite(grid.values[i]) ? 1 : 0;
-  std::vector<float> next = grid.values;
-  std::vector<char> filled(known.size(), 0);
-  const auto mean_around = [&](int column, int row) {
-    float sum = 0.0F;
-    float weights = 0.0F;
-    for (int j = -1; j <= 1; ++j) {
-      for (int i = -1; i <= 1; ++i) {
-        if ((i == 0 && j == 0) || !grid.contains(column + i, row + j)) continue;
-        const float z = grid.values[grid.index(column + i, row + j)];
-        if (!std::isfinite(z)) continue;
-        const float weight = i == 0 || j == 0 ? 1.0F : 0.5F;
-        sum += weight * z;
-        weights += weight;
-      }
-    }
-    return weights > 0.0F ? sum / weights : kNan;
-  };
-  const auto sweep = [&](bool only_unknown) {
-    parallel_for(static_cast<std::size_t>(grid.rows), 16, [&](std::size_t r) {
-      const int row = static_cast<int>(r);
-      for (int column = 0; column < grid.columns; ++column) {
-        const std::size_t i = grid.index(column, row);
-        if (wanted[i] == 0 || known[i] != 0 || (!only_unknown && filled[i] == 0)) continue;
-        if (only_unknown && std::isfinite(grid.values[i])) continue;
-        next[i] = mean_around(column, row);
-        if (next[i] > no_higher[i]) next[i] = no_higher[i];  // not where either is unknown
-        if (std::isfinite(next[i])) filled[i] = 1;
-      }
+  std::vector<std::size_t> unknown;
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    if (wanted[i] != 0 && !std::isfinite(grid.values[i])) unknown.push_back(i);
+  std::vector<float> next(unknown.size());
+  // All cells at once: none sees what another one has become.
+  const auto sweep = [&](const std::vector<std::size_t>& cells) {
+    parallel_for(cells.size(), 4096, [&](std::size_t k) {
+      next[k] = mean_around(grid, cells[k]);
+      const float most = no_higher[cells[k]];
+      if (next[k] > most) next[k] = most;  // not where either is unknown
     });
-    grid.values = next;
+    for (std::size_t k = 0; k < cells.size(); ++k)
+      grid.values[cells[k]] = next[k];
   };
-  const auto left = [&] {
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < wanted.size(); ++i)
-      count += wanted[i] != 0 && !std::isfinite(grid.values[i]) ? 1 : 0;
-    return count;
-  };
-  for (std::size_t before = left(), now = 0; before > 0; before = now) {
-    sweep(true);
-    now = left();
-    if (now == before) break;
+  std::vector<std::size_t> filled;
+  while (!unknown.empty()) {
+    sweep(unknown);
+    const std::size_t before = unknown.size();
+    std::erase_if(unknown, [&](std::size_t i) {
+      if (!std::isfinite(grid.values[i])) return false;
+      filled.push_back(i);
+      return true;
+    });
+    if (unknown.size() == before) break;
   }
   for (int i = 0; i < 4 * rings; ++i)
-    sweep(false);
+    sweep(filled);
 }
 
 // Drops ground heights above the plane through their neighbours, such as a stump or a low branch

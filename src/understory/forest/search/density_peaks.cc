@@ -20,6 +20,7 @@ using CoreWeights = std::array<float, 2 * kCoreCells + 1>;
 
 constexpr int kBorder = kAroundCells + kPeakCells + kCoreCells;
 constexpr int kWidth = kBlockCells + 2 * kBorder;
+constexpr std::size_t kTogether = 16;  // blocks that share their memory
 
 // Of cells so far from the middle: a Gaussian whose middle has 1.
 CoreWeights core_weights() {
@@ -30,13 +31,30 @@ CoreWeights core_weights() {
   return weights;
 }
 
-// The cells of one block, with a border.
+// The cells of a block, with a border. One after another lies in the same memory: to clear all of
+// it for each block would take longer than to search the few cells that hold points.
 class Block {
  public:
-  Block(const Cell& block, const std::vector<Cell>& points)
-      : row0_(block.first * kBlockCells - kBorder),
-        column0_(block.second * kBlockCells - kBorder),
-        counts_(static_cast<std::size_t>(kWidth) * kWidth, 0) {
+  Block() : counts_(static_cast<std::size_t>(kWidth) * kWidth, 0) {}
+
+  // Peaks of a block without its border.
+  [[nodiscard]] std::vector<DensityPeak> peaks(const Cell& block, const std::vector<Cell>& points) {
+    fill(block, points);
+    const std::vector<Cell> dense = dense_cells();
+    std::vector<DensityPeak> peaks;
+    if (!dense.empty()) peaks = peaks_among(dense);  // most blocks far from the path have none
+    for (const auto& [r, c] : dense)
+      core_[at(r, c)] = 0.0F;
+    for (const auto& [r, c] : occupied_)
+      counts_[at(r, c)] = 0;
+    return peaks;
+  }
+
+ private:
+  void fill(const Cell& block, const std::vector<Cell>& points) {
+    row0_ = block.first * kBlockCells - kBorder;
+    column0_ = block.second * kBlockCells - kBorder;
+    occupied_.clear();
     for (const auto& [row, column] : points) {
       const Cell cell{row - row0_, column - column0_};
       if (counts_[at(cell.first, cell.second)]++ == 0) occupied_.push_back(cell);
@@ -44,11 +62,8 @@ class Block {
     std::sort(occupied_.begin(), occupied_.end());
   }
 
-  // Peaks of the block without its border.
-  [[nodiscard]] std::vector<DensityPeak> peaks() {
-    const std::vector<Cell> dense = dense_cells();
+  [[nodiscard]] std::vector<DensityPeak> peaks_among(const std::vector<Cell>& dense) {
     std::vector<DensityPeak> peaks;
-    if (dense.empty()) return peaks;  // as most blocks far from the path
     sum_up();
     for (const auto& [r, c] : dense) {
       if (!is_within(r) || !is_within(c) || !is_highest(r, c)) continue;
@@ -60,7 +75,6 @@ class Block {
     return peaks;
   }
 
- private:
   static bool is_within(int i) { return i >= kBorder && i < kWidth - kBorder; }
   static std::size_t at(int r, int c) {
     return static_cast<std::size_t>(r) * kWidth + static_cast<std::size_t>(c);
@@ -87,7 +101,7 @@ class Block {
 
   // Sums over all cells of lower rows and columns.
   void sum_up() {
-    sums_.assign(static_cast<std::size_t>(kWidth + 1) * (kWidth + 1), 0);
+    sums_.resize(static_cast<std::size_t>(kWidth + 1) * (kWidth + 1), 0);
     for (int r = 0; r < kWidth; ++r) {
       std::uint32_t row = 0;
       for (int c = 0; c < kWidth; ++c) {
@@ -148,8 +162,8 @@ class Block {
     return kCellM / points * sum;
   }
 
-  int row0_;
-  int column0_;
+  int row0_ = 0;
+  int column0_ = 0;
   std::vector<std::uint32_t> counts_;
   std::vector<Cell> occupied_;
   std::vector<std::uint32_t> sums_;
@@ -189,9 +203,13 @@ std::vector<DensityPeak> find_density_peaks(const std::vector<Eigen::Vector2f>& 
     if (block.second.size() >= kFewestPoints) filled.push_back(&block);
   }
   std::vector<std::vector<DensityPeak>> found(filled.size());
-  parallel_for(filled.size(), 1, [&](std::size_t i) {
-    progress.poll();
-    found[i] = Block(filled[i]->first, filled[i]->second).peaks();
+  parallel_for((filled.size() + kTogether - 1) / kTogether, 1, [&](std::size_t group) {
+    Block block;
+    const std::size_t end = std::min(filled.size(), (group + 1) * kTogether);
+    for (std::size_t i = group * kTogether; i < end; ++i) {
+      progress.poll();
+      found[i] = block.peaks(filled[i]->first, filled[i]->second);
+    }
   });
   std::vector<DensityPeak> peaks;
   for (const std::vector<DensityPeak>& part : found)
