@@ -10,6 +10,7 @@ endif()
 #                      headers cost, but for Eigen's types the compiler's time grows faster than their number.
 #                      Layers of text, without such types, take more. A `|` between two files ends a unit:
 #                      files behind one form a unit of their own, and only their names must differ in it
+#   OPTIMISED          the compiler's option where it is not the usual one. -O1 suits layers in which no time is spent
 #   APART              further ones that are compiled by themselves, also with UNDERSTORY_UNITY: names in
 #                      them clash with others', or their loops are to be optimised for themselves
 #   TESTS              x_test.cc beside x.cc; together the GoogleTest program test_<name>
@@ -17,7 +18,7 @@ endif()
 #   LIBRARIES          third-party targets that its headers need (PUBLIC)
 #   PRIVATE_LIBRARIES  third-party targets that only its .cc files need
 function(understory_layer name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TOGETHER"
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TOGETHER;OPTIMISED"
                         "SOURCES;APART;TESTS;DEPENDS;LIBRARIES;PRIVATE_LIBRARIES;TEST_LIBRARIES")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "understory_layer(${name}): unknown argument ${arg_UNPARSED_ARGUMENTS}")
@@ -33,7 +34,10 @@ function(understory_layer name)
     understory_unite(${target} ${arg_TOGETHER} ${arg_SOURCES})
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE understory_own_code ${arg_PRIVATE_LIBRARIES})
-    understory_precompile(${target})
+    understory_precompile(${target} ${arg_OPTIMISED})
+    if(NOT arg_OPTIMISED)
+      set_property(GLOBAL APPEND PROPERTY understory_fast_layers ${target})
+    endif()
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
@@ -153,20 +157,32 @@ function(understory_python_test name)
 endfunction()
 
 # understory_program(<target> SOURCES ... [LAYERS ...] [LIBRARIES ...])
-# The command-line tool: lies at the root of the build folder and is installed.
+# The command-line tool: lies at the root of the build folder and is installed. Its sources are a library that is linked
+# behind the layers that are optimised most. Of an inline function the linker takes the first copy that it meets.
 function(understory_program target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LAYERS;LIBRARIES")
   list(TRANSFORM arg_LAYERS PREPEND understory::)
-  add_executable(${target})
+  set(commands ${target}_commands)
+  add_library(${commands} STATIC)
   # All of it at once: the parser of options is compiled anew in each part, which takes longer than the rest.
-  understory_unite(${target} 1000 ${arg_SOURCES})
-  target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}/src")
-  target_link_libraries(${target} PRIVATE understory_own_code understory_flags ${arg_LAYERS}
-                                          ${arg_LIBRARIES})
-  understory_precompile(${target})
-  target_compile_definitions(${target} PRIVATE UNDERSTORY_VERSION="${PROJECT_VERSION}")
+  understory_unite(${commands} 1000 ${arg_SOURCES})
+  target_include_directories(${commands} PRIVATE "${PROJECT_SOURCE_DIR}/src")
+  target_link_libraries(${commands} PRIVATE understory_own_code understory_flags ${arg_LAYERS} ${arg_LIBRARIES})
+  understory_precompile(${commands} -O1)
+  target_compile_definitions(${commands} PRIVATE UNDERSTORY_VERSION="${PROJECT_VERSION}")
+  add_executable(${target})
+  target_link_libraries(${target} PRIVATE understory_own_code understory_flags)
   set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}")
   install(TARGETS ${target} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
+endfunction()
+
+# understory_link_program(<target>): when all layers are there.
+function(understory_link_program target)
+  get_property(fast GLOBAL PROPERTY understory_fast_layers)
+  foreach(layer IN LISTS fast)
+    target_sources(${target} PRIVATE "$<TARGET_OBJECTS:${layer}>")
+  endforeach()
+  target_link_libraries(${target} PRIVATE ${target}_commands)
 endfunction()
 
 # understory_benchmark(<target> SOURCES ... [LAYERS ...] [LIBRARIES ...])
