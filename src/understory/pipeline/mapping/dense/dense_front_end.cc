@@ -11,46 +11,9 @@
 namespace understory {
 namespace {
 
+constexpr const char* kFixesFile = "fixes.bin";
 constexpr std::size_t kMostWaitingImu = 20'000;
 constexpr std::size_t kRecentImu = 400;  // enough for the attitude of a new segment
-
-FeaturePoints points_in_range(const BodyCloud& cloud, const VoxelFilterConfig& config) {
-  const auto low = static_cast<float>(config.range_min_m);
-  const auto high = static_cast<float>(config.range_max_m);
-  FeaturePoints kept;
-  const std::vector<std::uint8_t> lidars = lidars_of(cloud.ring);
-  kept.points.reserve(cloud.size());
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    if (!(cloud.range[i] >= low && cloud.range[i] <= high)) continue;
-    kept.points.push_back(cloud.points[i]);
-    if (!cloud.feature.empty()) kept.features.push_back(cloud.feature[i]);
-    if (!lidars.empty()) kept.lidars.push_back(lidars[i]);
-  }
-  return kept;
-}
-
-FeaturePoints with_lidars(BodyCloud&& cloud) {
-  return {std::move(cloud.points), std::move(cloud.feature), lidars_of(cloud.ring)};
-}
-
-// One point a voxel of what goes along, lidar by lidar.
-void add_carried(const BodyCloud& cloud, const VoxelFilterConfig& config, VoxelFilter& filter,
-                 FeaturePoints& to) {
-  std::vector<Points> carried(1);
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    if (!cloud.is_carried(i) || static_cast<double>(cloud.range[i]) < config.range_min_m) continue;
-    const std::size_t lidar = cloud.ring[i] / kRingsALidar;
-    if (lidar >= carried.size()) carried.resize(lidar + 1);
-    carried[lidar].push_back(cloud.points[i]);
-  }
-  if (carried.size() > 1) to.lidars.resize(to.points.size(), 0);
-  for (std::size_t lidar = 0; lidar < carried.size(); ++lidar) {
-    const Points thinned = filter.filter(carried[lidar], config.voxel_size_m);
-    to.points.insert(to.points.end(), thinned.begin(), thinned.end());
-    if (carried.size() > 1 || !to.lidars.empty())
-      to.lidars.resize(to.points.size(), static_cast<std::uint8_t>(lidar));
-  }
-}
 
 }  // namespace
 
@@ -59,14 +22,15 @@ DenseFrontEnd::DenseFrontEnd(const DenseMappingConfig& config, const SensorTrait
                              Log& log)
     : config_(config),
       traits_(traits),
+      conditions_(conditions),
       folder_(std::move(folder)),
       log_(log),
       map_(std::make_unique<KeyframeMap>(config.keyframe_map, folder_, times_, log)),
+      map_points_(config),
+      clouds_(config, folder_, times_),
+      between_(config, folder_),
+      fix_file_(folder_ / kFixesFile),
       recovery_(config.lost_after_scans),
-      imu_doubted_(conditions.imu_doubted),
-      imu_cleared_s_(conditions.imu_cleared ? std::optional(conditions.imu_judged_s)
-                                            : std::nullopt),
-      imu_refined_(conditions.imu_refined),
       opening_(std::make_unique<Opening>()) {
   if (config.max_memory_mb > 0.0) return_freed_memory_sooner();
   received_.clock = LidarImuClockCheck(config.odometry.motion.imu);
@@ -83,7 +47,7 @@ DenseFrontEnd::DenseFrontEnd(const DenseMappingConfig& config, const SensorTrait
 
 void DenseFrontEnd::refuse_imu(const std::string& reason) {
   UNDERSTORY_CHECK(!started());
-  imu_refused_ = reason;
+  conditions_.imu_refused = reason;
   config_.odometry.imu_enabled = false;
 }
 
@@ -92,8 +56,10 @@ ImuFinding DenseFrontEnd::imu_finding() const {
   const ImuTrust trust = odometry_->motion().imu_trust();
   if (!trust.usable) return {ImuFinding::Verdict::kWrong, trust.reason};
   // A run that has doubted it from the start finds out who is right.
-  if (!imu_doubted_ && trust.on_probation) return {ImuFinding::Verdict::kSuspected, trust.reason};
-  if (imu_doubted_ && trust.proven && trust.trusted) return {ImuFinding::Verdict::kCleared, ""};
+  if (!conditions_.imu_doubted && trust.on_probation)
+    return {ImuFinding::Verdict::kSuspected, trust.reason};
+  if (conditions_.imu_doubted && trust.proven && trust.trusted)
+    return {ImuFinding::Verdict::kCleared, ""};
   return {};
 }
 
@@ -129,7 +95,7 @@ void DenseFrontEnd::take(const Event& event, const Rig& rig) {
       refine_rig();
       start_anew();
     }
-    if (partial_path_) match_parts(**scan);
+    if (between_.parts() != nullptr) match_parts(**scan);
     on_scan(**scan);
   }
 }
@@ -146,7 +112,7 @@ void DenseFrontEnd::take_sample(const ImuSample& sample) {
     received_.imu.pop_front();
   if (!started()) return;
   odometry_->add_imu(sample);
-  if (imu_path_) predict_at(sample.stamp);
+  if (between_.imu() != nullptr) predict_at(sample.stamp);
 }
 
 // An IMU that sends no numbers is as none until it does.
@@ -175,8 +141,9 @@ void DenseFrontEnd::complete_rig(const Rig& rig) {
 
 // What runs before this one found of the IMU, to an odometry that is to use it.
 void DenseFrontEnd::tell_of_imu(TimeNs now) {
-  if (imu_doubted_) odometry_->suspect_imu(now);
-  if (imu_cleared_s_) odometry_->vouch_for_imu(first_scan() + from_seconds(*imu_cleared_s_));
+  if (conditions_.imu_doubted) odometry_->suspect_imu(now);
+  if (conditions_.imu_cleared)
+    odometry_->vouch_for_imu(first_scan() + from_seconds(conditions_.imu_judged_s));
 }
 
 void DenseFrontEnd::make_odometry(const Rig& rig) {
@@ -194,12 +161,8 @@ void DenseFrontEnd::make_odometry(const Rig& rig) {
 // An empty map, and an odometry that knows the IMU before the first scan and the motion assumed.
 void DenseFrontEnd::start_anew() {
   journal_ = std::make_unique<Journal>(folder_ / kJournalFile);
-  begin_paths_between();
-  clouds_ = std::make_unique<ScanClouds>(clouds_config(), folder_ / kCloudsFile, times_);
-  if (keeps_far_clouds()) {
-    far_clouds_ =
-        std::make_unique<ScanClouds>(far_clouds_config(), folder_ / kFarCloudsFile, times_);
-  }
+  between_.begin();
+  clouds_.begin();
   map_->start();
   make_odometry(rig_);
   make_satellites();
@@ -229,7 +192,7 @@ void DenseFrontEnd::consider_opening(const Scan& scan, const DenseEstimate& esti
   if (estimate.matched && opening_->rounds < kMostRounds) {
     better = better_start(first, scan, map_->keyframes().front().world_from_body,
                           estimate.match.target_from_source, opening_->motion,
-                          odometry_->uses_imu() && !imu_doubted_);
+                          odometry_->uses_imu() && !conditions_.imu_doubted);
   }
   better ? repeat_opening(*better) : opening_.reset();
 }
@@ -404,12 +367,12 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
   Eigen::Map<Eigen::Vector3d>(record.accel_bias.data()) = state.accel_bias;
   if (!wanted) {
     const auto keyframe = static_cast<std::size_t>(record.keyframe);
-    if (good && !first) offer_cloud(estimate, keyframe, keyframe_from_body);
+    if (good && !first) clouds_.offer(estimate, keyframe, keyframe_from_body, map_->keyframes());
     return;
   }
   record.becomes_keyframe = 1;
-  offer_cloud(estimate, map_->keyframes().size(), Pose());
-  const auto moved = map_->add(record.stamp, offer, map_points(estimate));
+  clouds_.offer(estimate, map_->keyframes().size(), Pose(), map_->keyframes());
+  const auto moved = map_->add(record.stamp, offer, map_points_.of(estimate));
   if (moved) move_world(*moved);
   watch_memory();
 }
@@ -430,65 +393,6 @@ void DenseFrontEnd::move_world(const Pose& new_world_from_old_world) {
   std::optional<Pose>& so_far = positioned_.new_world_from_old_world;
   so_far = so_far ? new_world_from_old_world * *so_far : new_world_from_old_world;
   positioned_.pose.world_from_body = new_world_from_old_world * positioned_.pose.world_from_body;
-}
-
-// What the map takes from a scan: more than what is matched.
-FeaturePoints DenseFrontEnd::map_points(const DenseEstimate& estimate) {
-  VoxelFilterConfig voxel = config_.odometry.voxel;
-  const double edge = config_.keyframe_map.keyframe.voxel_size_m;
-  const BodyCloud& cloud = estimate.tops ? *estimate.tops : estimate.cloud;
-  if (edge == 0.0) return points_in_range(cloud, voxel);
-  voxel.voxel_size_m = std::min(voxel.voxel_size_m, edge);
-  if (!estimate.cloud.feature.empty()) {
-    return with_lidars(cloud_filter_.filter_features(estimate.cloud, voxel, true));
-  }
-  if (voxel.voxel_size_m == config_.odometry.voxel.voxel_size_m) {
-    // What seems to be carried may be a stem beside a machine that stands: it is seen again later.
-    FeaturePoints points = with_lidars(BodyCloud(estimate.thinned));
-    add_carried(cloud, voxel, cloud_filter_, points);
-    return points;
-  }
-  return with_lidars(cloud_filter_.filter(cloud, voxel, true));
-}
-
-ScanCloudsConfig DenseFrontEnd::clouds_config() const {
-  ScanCloudsConfig clouds;
-  clouds.enabled = config_.map_enabled;
-  clouds.distance_m = config_.cloud_distance_m;
-  clouds.thin_m = config_.keyframe_thin_m;
-  clouds.range_min_m = config_.odometry.voxel.range_min_m;
-  clouds.range_max_m = config_.map_range_max_m;
-  clouds.keyframe = config_.keyframe_map.keyframe;
-  return clouds;
-}
-
-bool DenseFrontEnd::keeps_far_clouds() const {
-  return config_.map_enabled && config_.far_cloud_distance_m > 0.0 &&
-         config_.far_cloud_distance_m < config_.cloud_distance_m;
-}
-
-// Far points lie farther from each other than a cloud is thinned.
-ScanCloudsConfig DenseFrontEnd::far_clouds_config() const {
-  ScanCloudsConfig clouds = clouds_config();
-  clouds.distance_m = config_.far_cloud_distance_m;
-  clouds.range_min_m = std::max(clouds.range_min_m, config_.far_m);
-  clouds.thin_m = 0.0;
-  return clouds;
-}
-
-// Perhaps keeps what a scan adds to the finished map.
-void DenseFrontEnd::offer_cloud(const DenseEstimate& estimate, std::size_t keyframe,
-                                const Pose& keyframe_from_body) {
-  const auto offer_to = [&](ScanClouds& clouds) {
-    return clouds.offer(estimate.cloud, estimate.state.world_from_body, keyframe,
-                        keyframe_from_body, map_->keyframes());
-  };
-  const bool kept = offer_to(*clouds_);
-  if (!far_clouds_) return;
-  if (kept)
-    far_clouds_->pass_over(keyframe, keyframe_from_body);
-  else
-    offer_to(*far_clouds_);
 }
 
 }  // namespace understory

@@ -11,15 +11,18 @@
 #include "understory/calibration/lidar_imu/clock_check.h"
 #include "understory/calibration/lidar_imu/online_calibration.h"
 #include "understory/georeference/satellites/satellite_belief.h"
-#include "understory/map/clouds/scan_clouds.h"
 #include "understory/map/keyframes/keyframe_map.h"
 #include "understory/odometry/dense/dense_odometry.h"
 #include "understory/odometry/dense/recovery.h"
 #include "understory/odometry/dense/start_in_motion.h"
 #include "understory/pipeline/judgement/imu_usage.h"
+#include "understory/pipeline/mapping/adaptation.h"
+#include "understory/pipeline/mapping/dense/fix_file.h"
+#include "understory/pipeline/mapping/dense/map_points.h"
+#include "understory/pipeline/mapping/dense/paths_between_scans.h"
+#include "understory/pipeline/mapping/dense/stored_clouds.h"
 #include "understory/pipeline/mapping/front_end.h"
 #include "understory/pipeline/run_folder/journal.h"
-#include "understory/pipeline/run_folder/relative_path.h"
 #include "understory/recording/recording.h"
 #include "understory/sensor/gnss_fix.h"
 #include "understory/util/log.h"
@@ -96,8 +99,8 @@ class DenseFrontEnd : public FrontEnd {
   [[nodiscard]] const DenseMappingConfig& config() const { return config_; }
   [[nodiscard]] const SensorTraits& traits() const { return traits_; }
   // Why this run does without the IMU; empty if it does not.
-  [[nodiscard]] const std::string& imu_refused() const { return imu_refused_; }
-  [[nodiscard]] bool imu_cleared() const { return imu_cleared_s_.has_value(); }
+  [[nodiscard]] const std::string& imu_refused() const { return conditions_.imu_refused; }
+  [[nodiscard]] bool imu_cleared() const { return conditions_.imu_cleared; }
   [[nodiscard]] const Rig& rig() const { return rig_; }
   [[nodiscard]] const DenseCounts& counts() const { return received_.counts; }
   // For how long the IMU's samples could not be used.
@@ -107,21 +110,16 @@ class DenseFrontEnd : public FrontEnd {
   // Place and clock of the IMU by the whole run, and what it was mapped with: as in
   // `refined_imu`. Nothing without `refine_imu` and where the motion does not tell them.
   [[nodiscard]] std::optional<OnlineImuEstimate> imu_calibration() const;
-  [[nodiscard]] const std::optional<RefinedImu>& imu_used() const { return imu_refined_; }
+  [[nodiscard]] const std::optional<RefinedImu>& imu_used() const {
+    return conditions_.imu_refined;
+  }
   [[nodiscard]] const KeyframeMap& map() const { return *map_; }
   [[nodiscard]] KeyframeMap& map() { return *map_; }
   // Whether the configuration of this run has it use an IMU.
   [[nodiscard]] bool imu_wanted() const { return config_.odometry.imu_enabled; }
   [[nodiscard]] const Journal& journal() const { return *journal_; }
-  // A prediction for each sample of the IMU; null without `imu_rate`.
-  [[nodiscard]] RelativePath* imu_path() { return imu_path_.get(); }
-  // A pose for each part of each scan but the first; null with `scan_fraction` 1.
-  [[nodiscard]] RelativePath* partial_path() { return partial_path_.get(); }
-  [[nodiscard]] const KeyframeClouds& clouds() const { return clouds_->clouds(); }
-  // Those between them, of what is far; null without `map.far_cloud_distance_m`.
-  [[nodiscard]] const KeyframeClouds* far_clouds() const {
-    return far_clouds_ ? &far_clouds_->clouds() : nullptr;
-  }
+  [[nodiscard]] PathsBetweenScans& paths_between() { return between_; }
+  [[nodiscard]] const StoredClouds& clouds() const { return clouds_; }
   // All fixes so far, which lie on disk: read anew at each call.
   [[nodiscard]] std::vector<GnssFix> fixes() const;
   [[nodiscard]] std::size_t fix_count() const;
@@ -136,10 +134,6 @@ class DenseFrontEnd : public FrontEnd {
 
  private:
   static constexpr const char* kJournalFile = "journal.bin";
-  static constexpr const char* kCloudsFile = "clouds.bin";
-  static constexpr const char* kFarCloudsFile = "far_clouds.bin";
-  static constexpr const char* kImuPathFile = "imu_path.bin";
-  static constexpr const char* kPartialPathFile = "partial_path.bin";
 
   // What came of the recording so far.
   struct Received {
@@ -172,8 +166,6 @@ class DenseFrontEnd : public FrontEnd {
   [[nodiscard]] bool without_samples() const;
   void take_sample(const ImuSample& sample);
   void start_anew();
-  void begin_paths_between();
-  void load_paths_between(BinaryReader& reader);
   void predict_at(TimeNs stamp);
   void match_parts(const Scan& scan);
   void consider_opening(const Scan& scan, const DenseEstimate& estimate);
@@ -184,18 +176,13 @@ class DenseFrontEnd : public FrontEnd {
   void update_map(const DenseEstimate& estimate, ScanRecord& record);
   void watch_memory();
   void move_world(const Pose& new_world_from_old_world);
-  [[nodiscard]] FeaturePoints map_points(const DenseEstimate& estimate);
-  [[nodiscard]] ScanCloudsConfig clouds_config() const;
-  [[nodiscard]] ScanCloudsConfig far_clouds_config() const;
-  [[nodiscard]] bool keeps_far_clouds() const;
-  void offer_cloud(const DenseEstimate& estimate, std::size_t keyframe,
-                   const Pose& keyframe_from_body);
   void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
   void check_clock(const DenseEstimate& estimate, const ScanRecord& record);
   void refine_rig();
 
   DenseMappingConfig config_;
   SensorTraits traits_;
+  RunConditions conditions_;  // what earlier starts of this run found of the IMU
   std::filesystem::path folder_;
   Log& log_;
   StageTimes times_;
@@ -204,21 +191,15 @@ class DenseFrontEnd : public FrontEnd {
   std::unique_ptr<DenseOdometry> odometry_;
   std::unique_ptr<SatelliteBelief> satellites_;
   std::unique_ptr<KeyframeMap> map_;
+  MapPoints map_points_;
   std::unique_ptr<Journal> journal_;
-  std::unique_ptr<RelativePath> imu_path_;
-  std::unique_ptr<RelativePath> partial_path_;
-  std::unique_ptr<ScanClouds> clouds_;
-  std::unique_ptr<ScanClouds> far_clouds_;  // null where none are kept
-  VoxelFilter cloud_filter_;
-  std::unique_ptr<RecordFile> fixes_file_;  // null until fixes were put away
+  StoredClouds clouds_;
+  PathsBetweenScans between_;
+  FixFile fix_file_;
   TimeNs last_scan_end_ = 0;
   PositionedScan positioned_;  // the last one
   Recovery recovery_;
-  std::string imu_refused_;
-  bool imu_doubted_ = false;
-  std::optional<double> imu_cleared_s_;    // seconds since the first scan, of the verdict
-  std::optional<RefinedImu> imu_refined_;  // what the IMU is used with instead of what is given
-  std::unique_ptr<Opening> opening_;       // until the first scans are settled
+  std::unique_ptr<Opening> opening_;  // until the first scans are settled
 };
 
 }  // namespace understory

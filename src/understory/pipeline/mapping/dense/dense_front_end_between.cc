@@ -4,24 +4,6 @@
 
 namespace understory {
 
-void DenseFrontEnd::begin_paths_between() {
-  imu_path_.reset();
-  if (config_.imu_rate) imu_path_ = std::make_unique<RelativePath>(folder_ / kImuPathFile);
-  partial_path_.reset();
-  if (config_.scan_fraction < 1.0)
-    partial_path_ = std::make_unique<RelativePath>(folder_ / kPartialPathFile);
-}
-
-void DenseFrontEnd::load_paths_between(BinaryReader& reader) {
-  if (config_.imu_rate) {
-    imu_path_ = std::make_unique<RelativePath>(folder_ / kImuPathFile, reader.get<RecordCount>());
-  }
-  if (config_.scan_fraction < 1.0) {
-    partial_path_ =
-        std::make_unique<RelativePath>(folder_ / kPartialPathFile, reader.get<RecordCount>());
-  }
-}
-
 // As soon as the last point of a part is there, the scan before is positioned, and its map is the
 // local map. So it is here, where all parts come with the last one.
 void DenseFrontEnd::match_parts(const Scan& scan) {
@@ -33,7 +15,8 @@ void DenseFrontEnd::match_parts(const Scan& scan) {
       odometry_->motion().predict(odometry_->last_scan()).world_from_body.inverse();
   DenseCounts& counts = received_.counts;
   for (const PartEstimate& part : parts) {
-    partial_path_->add({part.stamp, journal_->size() - 1, body_from_world * part.world_from_body});
+    between_.parts()->add(
+        {part.stamp, journal_->size() - 1, body_from_world * part.world_from_body});
     ++counts.scan_parts;
     counts.scan_parts_matched += part.matched ? 1 : 0;
     counts.parts_span += part.end - part.stamp;
@@ -50,8 +33,8 @@ void DenseFrontEnd::predict_at(TimeNs stamp) {
   const TimeNs scan = odometry_->last_scan();
   if (stamp <= scan) return;
   const std::vector<StampedPose> path = motion.predict_path(scan, stamp);
-  imu_path_->add({stamp, journal_->size() - 1,
-                  path.front().world_from_body.inverse() * path.back().world_from_body});
+  between_.imu()->add({stamp, journal_->size() - 1,
+                       path.front().world_from_body.inverse() * path.back().world_from_body});
   ++received_.counts.predictions;
   const ImuTrust trust = motion.imu_trust();
   const bool by_imu = odometry_->uses_imu() && trust.usable && !trust.on_probation;

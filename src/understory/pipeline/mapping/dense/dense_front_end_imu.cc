@@ -5,8 +5,8 @@ namespace understory {
 
 // What a run before this one found stands in the place of what is given.
 void DenseFrontEnd::refine_rig() {
-  if (!imu_refined_ || !rig_.body_from_imu) return;
-  rig_.body_from_imu = imu_refined_->body_from_imu;
+  if (!conditions_.imu_refined || !rig_.body_from_imu) return;
+  rig_.body_from_imu = conditions_.imu_refined->body_from_imu;
   rig_.imu_extrinsic_source = "refined by the recording";
 }
 
@@ -40,14 +40,15 @@ std::optional<RefinedImu> DenseFrontEnd::refined_imu() const {
   if (!received_.calibration || !started() || !odometry_->uses_imu()) return std::nullopt;
   const std::optional<OnlineImuEstimate> found = received_.calibration->so_far();
   if (!found || !found->differs) return std::nullopt;
-  return RefinedImu{found->body_from_imu,
-                    found->late_s + (imu_refined_ ? imu_refined_->late_s : 0.0)};
+  return RefinedImu{
+      found->body_from_imu,
+      found->late_s + (conditions_.imu_refined ? conditions_.imu_refined->late_s : 0.0)};
 }
 
 std::optional<OnlineImuEstimate> DenseFrontEnd::imu_calibration() const {
   if (!received_.calibration || !started() || !odometry_->uses_imu()) return std::nullopt;
   std::optional<OnlineImuEstimate> found = received_.calibration->finished();
-  if (found && imu_refined_) found->late_s += imu_refined_->late_s;
+  if (found && conditions_.imu_refined) found->late_s += conditions_.imu_refined->late_s;
   return found;
 }
 

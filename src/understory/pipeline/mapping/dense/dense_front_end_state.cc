@@ -5,33 +5,13 @@
 #include "understory/util/error.h"
 
 namespace understory {
-namespace {
-
-constexpr const char* kFixesFile = "fixes.bin";
-
-void put_last(BinaryWriter& writer, const ScanClouds::Last& last) {
-  writer.put(last.keyframe);
-  put_pose(writer, last.keyframe_from_body);
-}
-
-ScanClouds::Last get_last(BinaryReader& reader) {
-  ScanClouds::Last last;
-  last.keyframe = reader.get<std::uint64_t>();
-  last.keyframe_from_body = get_pose(reader);
-  return last;
-}
-
-}  // namespace
-
 void DenseFrontEnd::sync() {
   store_fixes();
-  if (fixes_file_) fixes_file_->sync();
+  fix_file_.sync();
   if (!started()) return;
   journal_->sync();
-  if (imu_path_) imu_path_->sync();
-  if (partial_path_) partial_path_->sync();
-  clouds_->sync();
-  if (far_clouds_) far_clouds_->sync();
+  between_.sync();
+  clouds_.sync();
   map_->sync();
 }
 
@@ -40,22 +20,20 @@ std::vector<CountedFile> DenseFrontEnd::files() const {
   if (started()) {
     files = map_->files();
     files.push_back({kJournalFile, journal_->count()});
-    files.push_back({kCloudsFile, clouds_->clouds().count()});
-    if (far_clouds_) files.push_back({kFarCloudsFile, far_clouds_->clouds().count()});
-    if (imu_path_) files.push_back({kImuPathFile, imu_path_->count()});
-    if (partial_path_) files.push_back({kPartialPathFile, partial_path_->count()});
+    clouds_.list(files);
+    between_.list(files);
   }
-  if (fixes_file_) files.push_back({kFixesFile, fixes_file_->count()});
+  if (fix_file_.exists()) files.push_back({fix_file_.name(), fix_file_.count()});
   return files;
 }
 
 void DenseFrontEnd::save(BinaryWriter& writer) const {
   UNDERSTORY_CHECK(settled() || !started());
-  writer.put(imu_refused_);
-  writer.put(imu_doubted_);
-  writer.put(imu_cleared_s_.has_value());
-  if (imu_cleared_s_) writer.put(*imu_cleared_s_);
-  writer.put(fixes_file_ ? fixes_file_->count() : RecordCount());
+  writer.put(conditions_.imu_refused);
+  writer.put(conditions_.imu_doubted);
+  writer.put(conditions_.imu_cleared);
+  if (conditions_.imu_cleared) writer.put(conditions_.imu_judged_s);
+  writer.put(fix_file_.count());
   writer.put(received_.counts);
   received_.imu_usage.save(writer);
   received_.clock.save(writer);
@@ -71,43 +49,24 @@ void DenseFrontEnd::save(BinaryWriter& writer) const {
     put_imu(writer, sample);
   if (!started()) return;
   writer.put(journal_->count());
-  if (imu_path_) writer.put(imu_path_->count());
-  if (partial_path_) writer.put(partial_path_->count());
-  for (const ScanClouds* clouds : {clouds_.get(), far_clouds_.get()}) {
-    if (clouds == nullptr) continue;
-    put_optional(writer, clouds->last(), put_last);
-    writer.put(clouds->clouds().count());
-  }
+  between_.save(writer);
+  clouds_.save(writer);
   map_->save(writer);
   odometry_->save(writer);
   if (satellites_) satellites_->save(writer);
 }
 
 void DenseFrontEnd::store_fixes() {
-  if (received_.fixes.empty()) return;
-  if (!fixes_file_) fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile);
-  for (const GnssFix& fix : received_.fixes) {
-    BinaryWriter record;
-    put_fix(record, fix);
-    fixes_file_->append({bytes_of(record.bytes())});
-  }
+  fix_file_.append(received_.fixes);
   received_.fixes.clear();
 }
 
 std::size_t DenseFrontEnd::fix_count() const {
-  const std::uint64_t away = fixes_file_ ? fixes_file_->count().records : 0;
-  return static_cast<std::size_t>(away) + received_.fixes.size();
+  return fix_file_.size() + received_.fixes.size();
 }
 
 std::vector<GnssFix> DenseFrontEnd::fixes() const {
-  std::vector<GnssFix> fixes;
-  fixes.reserve(fix_count());
-  if (fixes_file_) {
-    fixes_file_->for_each([&](std::uint64_t /*offset*/, RecordFile::Bytes bytes) {
-      BinaryReader record({bytes.begin(), bytes.end()}, fixes_file_->path().string());
-      fixes.push_back(get_fix(record));
-    });
-  }
+  std::vector<GnssFix> fixes = fix_file_.read();
   fixes.insert(fixes.end(), received_.fixes.begin(), received_.fixes.end());
   return fixes;
 }
@@ -115,10 +74,10 @@ std::vector<GnssFix> DenseFrontEnd::fixes() const {
 void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
   const std::string refused = reader.get_string();
   if (!refused.empty()) refuse_imu(refused);
-  imu_doubted_ = reader.get<bool>();
-  if (reader.get<bool>()) imu_cleared_s_ = reader.get<double>();
-  const auto fixes = reader.get<RecordCount>();
-  if (fixes.records > 0) fixes_file_ = std::make_unique<RecordFile>(folder_ / kFixesFile, fixes);
+  conditions_.imu_doubted = reader.get<bool>();
+  conditions_.imu_cleared = reader.get<bool>();
+  if (conditions_.imu_cleared) conditions_.imu_judged_s = reader.get<double>();
+  fix_file_.go_on(reader.get<RecordCount>());
   received_.counts = reader.get<DenseCounts>();
   received_.imu_usage.load(reader);
   received_.clock.load(reader);
@@ -134,14 +93,8 @@ void DenseFrontEnd::load(BinaryReader& reader, const Rig& rig) {
     received_.imu.push_back(get_imu(reader));
   if (!was_started) return;
   journal_ = std::make_unique<Journal>(folder_ / kJournalFile, reader.get<RecordCount>());
-  load_paths_between(reader);
-  const auto load_clouds = [&](const ScanCloudsConfig& config, const char* file) {
-    const auto last = get_optional(reader, get_last);
-    const auto known = reader.get<RecordCount>();
-    return std::make_unique<ScanClouds>(config, folder_ / file, known, last, times_);
-  };
-  clouds_ = load_clouds(clouds_config(), kCloudsFile);
-  if (keeps_far_clouds()) far_clouds_ = load_clouds(far_clouds_config(), kFarCloudsFile);
+  between_.load(reader);
+  clouds_.load(reader);
   opening_.reset();
   rig_ = rig;
   rig_.body_from_imu = body_from_imu;

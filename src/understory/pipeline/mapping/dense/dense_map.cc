@@ -48,7 +48,7 @@ class DenseMap : public MapMaker {
     if (!front_end_.config().map_enabled) return;
     find_own_points();
     const ScopedTimer timer(front_end_.times(), "finish_gather_map");
-    const MapClouds map_clouds{front_end_.clouds(), front_end_.far_clouds(),
+    const MapClouds map_clouds{front_end_.clouds().near(), front_end_.clouds().far(),
                                front_end_.config().far_m};
     made_.tiles =
         make_finished_map(map_clouds, front_end_.map().keyframes(), front_end_.config().map,
@@ -58,7 +58,7 @@ class DenseMap : public MapMaker {
   void list_trees() override {
     if (!made_.tiles) return;
     const ScopedTimer timer(front_end_.times(), "finish_inventory");
-    const LidarView view = learn_view(front_end_.clouds(), front_end_.rig().body_from_lidar,
+    const LidarView view = learn_view(front_end_.clouds().near(), front_end_.rig().body_from_lidar,
                                       made_.trajectory.trajectory);
     const std::vector<Pose> poses = poses_of(front_end_.map().keyframes());
     made_.forest = std::make_unique<TiledMap>(*made_.tiles, front_end_.config().inventory_bytes,
@@ -83,7 +83,7 @@ class DenseMap : public MapMaker {
     const ScopedTimer timer(front_end_.times(), "finish_find_carrier");
     made_.carrier.path = made_.trajectory.trajectory;
     made_.carrier.region = find_carrier(
-        front_end_.clouds(), front_end_.map().keyframes(), made_.carrier.path,
+        front_end_.clouds().near(), front_end_.map().keyframes(), made_.carrier.path,
         front_end_.rig().body_from_lidar.translation(), config.carrier, recording_.progress);
   }
   // By the run's own fixes; gnss.csv.

@@ -172,10 +172,10 @@ void tell_calibration(const ReadRecording& recording, DenseFrontEnd& front_end,
 // matched: latency counts from its first point.
 void write_partial_path(const ReadRecording& recording, DenseFrontEnd& front_end,
                         const Trajectory& scans, RunDocuments& documents) {
-  if (front_end.partial_path() == nullptr) return;
+  if (front_end.paths_between().parts() == nullptr) return;
   const DenseCounts& counts = front_end.counts();
   documents.count("scan_parts", write_relative_path(recording.results / "trajectory_partial.tum",
-                                                    *front_end.partial_path(), scans));
+                                                    *front_end.paths_between().parts(), scans));
   documents.count("scan_parts_matched", counts.scan_parts_matched);
   if (counts.scan_parts == 0) return;
   const auto mean_ms = [&](const std::string& stage, TimeNs span, std::uint64_t number) {
@@ -192,10 +192,10 @@ void write_partial_path(const ReadRecording& recording, DenseFrontEnd& front_end
 // trajectory_imu.tum.
 void write_imu_path(const ReadRecording& recording, DenseFrontEnd& front_end,
                     const Trajectory& scans, RunDocuments& documents) {
-  if (front_end.imu_path() == nullptr) return;
+  if (front_end.paths_between().imu() == nullptr) return;
   const DenseCounts& counts = front_end.counts();
   documents.count("imu_predictions", write_relative_path(recording.results / "trajectory_imu.tum",
-                                                         *front_end.imu_path(), scans));
+                                                         *front_end.paths_between().imu(), scans));
   documents.count("imu_predictions_coasted", counts.coasted);
   if (counts.coasted == 0) return;
   recording.log.warn("imu_rate.without_imu",
