@@ -108,23 +108,34 @@ std::vector<char> cells_around_known(const Raster& grid, int rings) {
   return around;
 }
 
-// Mean of the eight neighbours of a cell, weighted by distance; NaN if none of them is known.
-float mean_around(const Raster& grid, std::size_t cell) {
-  const int row = static_cast<int>(cell / static_cast<std::size_t>(grid.columns));
-  const int column = static_cast<int>(cell % static_cast<std::size_t>(grid.columns));
+// Mean of known heights, weighted.
+struct HeightMean {
   float sum = 0.0F;
   float weights = 0.0F;
+
+  void add(float z, float weight) {
+    const float counts = std::isfinite(z) ? weight : 0.0F;
+    sum += std::isfinite(z) ? weight * z : 0.0F;
+    weights += counts;
+  }
+  [[nodiscard]] float value() const { return weights > 0.0F ? sum / weights : kNan; }
+};
+
+// Mean of the eight neighbours of a cell, weighted by distance; NaN if none of them is known.
+float mean_around(const Raster& grid, std::size_t cell) {
+  const auto width = static_cast<std::ptrdiff_t>(grid.columns);
+  const int row = static_cast<int>(cell / static_cast<std::size_t>(grid.columns));
+  const int column = static_cast<int>(cell % static_cast<std::size_t>(grid.columns));
+  const bool inner = column > 0 && row > 0 && column + 1 < grid.columns && row + 1 < grid.rows;
+  const float* here = grid.values.data() + cell;
+  HeightMean mean;
   for (int j = -1; j <= 1; ++j) {
     for (int i = -1; i <= 1; ++i) {
-      if ((i == 0 && j == 0) || !grid.contains(column + i, row + j)) continue;
-      const float z = grid.values[grid.index(column + i, row + j)];
-      if (!std::isfinite(z)) continue;
-      const float weight = i == 0 || j == 0 ? 1.0F : 0.5F;
-      sum += weight * z;
-      weights += weight;
+      if ((i == 0 && j == 0) || !(inner || grid.contains(column + i, row + j))) continue;
+      mean.add(here[j * width + i], i == 0 || j == 0 ? 1.0F : 0.5F);
     }
   }
-  return weights > 0.0F ? sum / weights : kNan;
+  return mean.value();
 }
 
 // Heights of the `wanted` cells from the known ones around, ring by ring until none is left. Then a

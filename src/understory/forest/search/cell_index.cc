@@ -63,23 +63,6 @@ CellIndex::CellIndex(const Points& points, const LivePoints& live, const Eigen::
   }
 }
 
-int CellIndex::column(float x) const {
-  return static_cast<int>(std::floor((x - low_.x()) / cell_m_));
-}
-
-int CellIndex::row(float y) const {
-  return static_cast<int>(std::floor((y - low_.y()) / cell_m_));
-}
-
-std::size_t CellIndex::stretch_of(int r, int c) const {
-  return static_cast<std::size_t>(r) * static_cast<std::size_t>(stretches_) +
-         static_cast<std::size_t>(c / kStretch);
-}
-
-std::size_t CellIndex::begin_of(int r, int c) const {
-  return stretch_of(r, c) * (kStretch + 1) + static_cast<std::size_t>(c % kStretch);
-}
-
 // Columns c0 to c1 of a row: one range a stretch.
 std::uint32_t CellIndex::add_cells(int r, int c0, int c1, std::vector<Range>* ranges) const {
   std::uint32_t count = 0;

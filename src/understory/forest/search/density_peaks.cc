@@ -31,8 +31,8 @@ CoreWeights core_weights() {
   return weights;
 }
 
-// The cells of a block, with a border. One after another lies in the same memory: to clear all of
-// it for each block would take longer than to search the few cells that hold points.
+// The cells of a block, with a border. One block after another lies in the same memory. To clear
+// all of it for each one would take longer than the search.
 class Block {
  public:
   Block() : counts_(static_cast<std::size_t>(kWidth) * kWidth, 0) {}

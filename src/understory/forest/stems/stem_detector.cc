@@ -266,11 +266,10 @@ void add_thin_stems(double most_m, const StemDetectorConfig& config, const StemS
                     const ProgressSink& progress, Search& search) {
   const std::vector<StemFit> columns =
       find_foliage_columns(search.points, search.explained, config, where, progress);
-  add_unclaimed(fit_all(columns, progress,
-                        [&](const StemFit& column) {
-                          return fit_column(search, column, most_m, config);
-                        }),
-                config, search);
+  add_unclaimed(
+      fit_all(columns, progress,
+              [&](const StemFit& column) { return fit_column(search, column, most_m, config); }),
+      config, search);
 }
 
 void add_foliage_stems(const StemDetectorConfig& config, const StemSearchArea& where,
