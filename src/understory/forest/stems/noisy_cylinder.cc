@@ -18,28 +18,40 @@ using namespace stem_constants::noisy_cylinder;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
+// Places on the circumference are taken so many at once.
+constexpr Eigen::Index kTogether = 4;
+using Places = Eigen::Array<double, kTogether, 1>;
+
 // exp(x) for x <= 0 to nine digits, a quarter of the library's time: the fit is made of these.
-double quick_exp(double x) {
+Places quick_exp(const Places& x) {
   constexpr double kLog2e = 1.4426950408889634;
   constexpr double kLn2 = 0.6931471805599453;
   constexpr double kToBits = 0x1.8p52;  // its last bits count ones
   constexpr double kLeast = -60.0;      // a chance of 1e-26 counts as none
-  // Rounded by an addition: the compiler makes no vectors of std::floor, which may trap.
-  const double whole = (x * kLog2e + kToBits) - kToBits;
-  const double r = x - whole * kLn2;  // at most 0.35
-  double sum = 1.0 / 40320.0;
+  const Places whole = (x * kLog2e + kToBits) - kToBits;
+  const Places rest = x - whole * kLn2;  // at most 0.35
+  Places sum = Places::Constant(1.0 / 40320.0);
   for (const double term :
        {1.0 / 5040.0, 1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0})
-    sum = sum * r + term;
-  const std::uint64_t exponent = std::bit_cast<std::uint64_t>(whole + kToBits) + 1023;
-  const double power = sum * std::bit_cast<double>(exponent << 52);
-  // A mask and no branch, which would keep the compiler from making vectors.
-  const std::uint64_t kept = -static_cast<std::uint64_t>(x >= kLeast);
-  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(power) & kept);
+    sum = sum * rest + term;
+  const Places bits = whole + kToBits;
+  Places power;
+  for (Eigen::Index i = 0; i < kTogether; ++i)
+    power[i] = std::bit_cast<double>((std::bit_cast<std::uint64_t>(bits[i]) + 1023) << 52);
+  return (x >= kLeast).select(sum * power, 0.0);
 }
 
-// Numbers that the loops over places take at once, at most.
-constexpr int kVector = 4;
+// The direction of (x, y) as a share of a turn, 0 to 1. At most 0.001 off: a sixth of the smallest
+// distance between places.
+double rough_turn(double x, double y) {
+  const double along = std::abs(x);
+  const double across = std::abs(y);
+  const double ratio = std::min(along, across) / std::max({along, across, 1e-12});
+  const double eighth = ratio * (0.9724 - 0.1919 * ratio * ratio) / (2.0 * M_PI);
+  const double quarter = across > along ? 0.25 - eighth : eighth;
+  const double half = x < 0.0 ? 0.5 - quarter : quarter;
+  return y < 0.0 ? 1.0 - half : half;
+}
 
 // A point seen along the stem: place in the plane across it, relative to the start's centre line.
 struct FlatPoint {
@@ -129,12 +141,13 @@ class Estimator {
   // Places on the circumference, near enough to each other that the scatter blurs the gaps.
   void spread_bins() {
     const double wanted = 2.0 * M_PI * radius_ / (kBinScatters * scatter_);
-    const auto count = static_cast<Eigen::Index>(std::clamp(wanted, kFewestBins, kMostBins));
-    visible_ = Eigen::ArrayXd::Constant(count, 1.0 / static_cast<double>(count));
+    const double quarter = std::clamp(wanted, kFewestBins, kMostBins) / kTogether;
+    const auto count = kTogether * static_cast<Eigen::Index>(std::ceil(quarter));
+    visible_ = Eigen::ArrayXd::Constant(2 * count, 1.0 / static_cast<double>(count));
     views_ = Eigen::VectorXd::Constant(kViews, 1.0 / kViews);
-    const Eigen::Index padded = 2 * count + kVector;
-    for (Eigen::ArrayXd* all : {&outward_x_, &outward_y_, &shares_, &squares_})
-      *all = Eigen::ArrayXd::Zero(padded);
+    for (Eigen::ArrayXd* all : {&outward_x_, &outward_y_})
+      all->resize(2 * count);
+    shares_.resize(count);
     for (Eigen::Index b = 0; b < 2 * count; ++b) {
       const double turn =
           2.0 * M_PI * (static_cast<double>(b % count) + 0.5) / static_cast<double>(count);
@@ -160,66 +173,43 @@ class Estimator {
     double log_likelihood = 0.0;
   };
 
-  // Squared distances of a point from the places [begin, end), and the chances that it came from
-  // them. Loops of their own over separate coordinates, so that the compiler makes vectors of them.
-  // The loops end at a whole vector: what lies between is not used.
-  void find_shares(int begin, int end, const Eigen::Vector2d& q, double r, double inverse) {
-    const auto count = static_cast<int>(visible_.size());
-    const int whole = (end - begin + kVector - 1) / kVector * kVector;
-    const double* x = outward_x_.data() + begin;
-    const double* y = outward_y_.data() + begin;
-    double* squares = squares_.data() + begin;
-    double* shares = shares_.data() + begin;
-    const double qx = q.x();
-    const double qy = q.y();
-    for (int b = 0; b < whole; ++b)
-      shares[b] = (qx - r * x[b]) * (qx - r * x[b]);
-    for (int b = 0; b < whole; ++b)
-      squares[b] = (qy - r * y[b]) * (qy - r * y[b]);
-    for (int b = 0; b < whole; ++b)
-      squares[b] += shares[b];
-    for (int b = 0; b < whole; ++b)
-      shares[b] = quick_exp(-0.5 * squares[b] * inverse);
-    const double* visible = visible_.data();
-    const int turn = std::min(end, count) - begin;
-    for (int b = 0; b < turn; ++b)
-      shares[b] *= visible[begin + b];
-    for (int b = std::max(0, turn); b < end - begin; ++b)
-      shares[b] *= visible[begin + b - count];
-  }
-
+  // `seen`: of the places twice round, the returns that came from them.
   void add_point(const FlatPoint& point, Sums& sums, Eigen::ArrayXd& seen) {
     const Eigen::Vector2d q = point.place - centre_ - point.rise * slope_;
     const double r = radius_ + taper_ * point.rise;
     const double inverse = 1.0 / (scatter_ * scatter_);
-    const double distance = q.norm();
     // Only places near the point's own angle can have given it.
-    const auto count = static_cast<int>(visible_.size());
-    const double width = kBlurReach * scatter_ / std::sqrt(std::max(1e-8, r * distance));
-    const int reach =
-        width >= M_PI ? count / 2 : static_cast<int>(width / (2.0 * M_PI) * count) + 1;
-    const int middle =
-        static_cast<int>(std::floor((std::atan2(q.y(), q.x()) / (2.0 * M_PI) + 1.0) * count));
-    const int first = middle - std::min(reach, (count - 1) / 2);
-    const int last = middle + std::min(reach, count / 2);
-    const int begin = ((first % count) + count) % count;
-    const int end = begin + last - first + 1;
-    find_shares(begin, end, q, r, inverse);
-    const Eigen::Index n = end - begin;
-    const auto shares = shares_.segment(begin, n);
-    const double density = shares.sum();
-    const Eigen::Vector2d mean((shares * outward_x_.segment(begin, n)).sum(),
-                               (shares * outward_y_.segment(begin, n)).sum());
-    const double square = (shares * squares_.segment(begin, n)).sum();
+    const auto count = shares_.size();
+    const double width = kBlurReach * scatter_ / std::sqrt(std::max(1e-8, r * q.norm()));
+    const auto reach =
+        static_cast<Eigen::Index>(width / (2.0 * M_PI) * static_cast<double>(count)) + 1;
+    const Eigen::Index near = std::min(count, (2 * reach + kTogether) / kTogether * kTogether);
+    const auto middle =
+        static_cast<Eigen::Index>(rough_turn(q.x(), q.y()) * static_cast<double>(count));
+    const Eigen::Index begin = (middle + count - near / 2) % count;
+    Places density = Places::Zero();
+    Places mean_x = Places::Zero();
+    Places mean_y = Places::Zero();
+    Places square = Places::Zero();
+    for (Eigen::Index b = 0; b < near; b += kTogether) {
+      const auto x = outward_x_.segment<kTogether>(begin + b);
+      const auto y = outward_y_.segment<kTogether>(begin + b);
+      const Places squares = (q.x() - r * x).square() + (q.y() - r * y).square();
+      const Places shares =
+          quick_exp(-0.5 * inverse * squares) * visible_.segment<kTogether>(begin + b);
+      shares_.segment<kTogether>(b) = shares;
+      density += shares;
+      mean_x += shares * x;
+      mean_y += shares * y;
+      square += shares * squares;
+    }
     const double scale = (1.0 - strays_) * inverse / (2.0 * M_PI);
-    const double all = scale * density + strays_ * stray_density_;
+    const double all = scale * density.sum() + strays_ * stray_density_;
     const double w = point.weight * scale / all;
     sums.log_likelihood += point.weight * std::log(all);
-    sums.square += w * square;
-    const Eigen::Index turn = std::min(end, count) - begin;
-    seen.segment(begin, turn) += w * shares.head(turn);
-    seen.head(n - turn) += w * shares.tail(n - turn);
-    add_to_system(point, w * density, w * mean, sums);
+    sums.square += w * square.sum();
+    seen.segment(begin, near) += w * shares_.head(near);
+    add_to_system(point, w * density.sum(), w * Eigen::Vector2d(mean_x.sum(), mean_y.sum()), sums);
   }
 
   // The model q = centre + rise slope + (radius + rise taper) outward is linear in its parameters.
@@ -274,7 +264,7 @@ class Estimator {
     result.covariance = s2 * solver.inverse();
     scatter_ = std::clamp(std::sqrt(0.5 * sums.square / sums.weight), kLeastScatter, kMostScatter);
     strays_ = std::clamp(1.0 - sums.weight / total_, kLeastStrays, config_.most_strays);
-    learn_views(seen);
+    learn_views(seen.head(shares_.size()) + seen.tail(shares_.size()));
     return true;
   }
 
@@ -283,10 +273,12 @@ class Estimator {
   // lobes. That ties the radius to the width seen where the side away from the scanner is unknown.
   void learn_views(const Eigen::ArrayXd& seen) {
     for (int round = 0; round < kViewRounds; ++round) {
-      const Eigen::ArrayXd ratio = (visible_ > 1e-12).select(seen / visible_, 0.0);
+      const auto visible = visible_.head(seen.size());
+      const Eigen::ArrayXd ratio = (visible > 1e-12).select(seen / visible, 0.0);
       views_.array() *= (lobes_.transpose() * ratio.matrix()).array();
       views_ = (views_.array() / views_.sum()).max(kLeastView);
-      visible_ = (lobes_ * views_).array();
+      visible_.head(seen.size()) = (lobes_ * views_).array();
+      visible_.tail(seen.size()) = visible_.head(seen.size());
     }
   }
 
@@ -303,14 +295,13 @@ class Estimator {
   double scatter_ = 0.0;
   double strays_ = kFirstStrays;
   double stray_density_ = 1.0;
-  Eigen::ArrayXd visible_;    // share of the returns that come from each place
-  Eigen::ArrayXd outward_x_;  // directions of the places, twice round
+  // Of the places, twice round: share of the returns that come from each, and its direction.
+  Eigen::ArrayXd visible_;
+  Eigen::ArrayXd outward_x_;
   Eigen::ArrayXd outward_y_;
   Eigen::VectorXd views_;  // share of the returns from each direction
   Eigen::MatrixXd lobes_;  // what each direction (column) sees of each place (row)
-  // Of a point, along `outward_x_`: chance that it came from there, and squared distance.
-  Eigen::ArrayXd shares_;
-  Eigen::ArrayXd squares_;
+  Eigen::ArrayXd shares_;  // of a point: the chances that it came from the places near it
 };
 
 }  // namespace
