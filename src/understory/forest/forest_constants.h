@@ -97,6 +97,11 @@ inline constexpr int kPlaneRounds = 6;
 inline constexpr double kPlaneMedians = 2.5;
 }  // namespace cloud_shape
 
+namespace uphill_side {  // forest/ground/uphill_side.cc
+// Directions in which the ground beside a stem is looked at [chosen]
+inline constexpr int kDirections = 16;
+}  // namespace uphill_side
+
 namespace inventory {  // forest/inventory.cc
 // m that a radius gains per metre between two scans of half a stem. That distance is the one that
 // outlines tell [tuned on clouds made by hand: 0.38, 0.43 and 0.45 at 3, 6 and 10 cm]

@@ -11,6 +11,7 @@
 
 #include "understory/forest/cell_grid.h"
 #include "understory/forest/forest_constants.h"
+#include "understory/forest/ground/uphill_side.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/tiles/stem_tiles.h"
 #include "understory/forest/trees/double_images.h"
@@ -49,7 +50,9 @@ std::vector<Tree> trees_of(const InventoryResult& result, const std::vector<doub
     tree.x = result.origin.x() + foot.x();
     tree.y = result.origin.y() + foot.y();
     tree.z = result.ground.terrain.interpolate(tree.x, tree.y);
-    tree.dbh_m = 2.0 * stem.radius_m;
+    // At the uphill side breast height lies higher up the stem.
+    const double rise = uphill_rise_m(result.ground.terrain, {tree.x, tree.y}, stem.radius_m);
+    tree.dbh_m = 2.0 * (stem.radius_m + rise * stem.taper);
     tree.dbh_sd_m = 2.0 * std::sqrt(std::max(0.0, stem.covariance(2, 2)));
     tree.height_m = heights[i];
     tree.lean_deg = std::atan(stem.slope.norm()) * 180.0 / M_PI;

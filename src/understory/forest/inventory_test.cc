@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "understory/forest/ground/uphill_side.h"
 #include "understory/forest/test_plot.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
@@ -38,7 +39,12 @@ TEST(Inventory, DiametersPositionsAndHeightsOfAStand) {
   }
   for (std::size_t i = 0; i < result.stems.size(); ++i) {
     EXPECT_GT(result.stems[i].section_radius_m, 0.0) << i;
-    EXPECT_EQ(result.trees[i].dbh_m, 2.0 * result.stems[i].section_radius_m) << i;
+    const Tree& tree = result.trees[i];
+    const StemFit& stem = result.stems[i];
+    const double rise =
+        uphill_rise_m(result.ground.terrain, {tree.x, tree.y}, stem.section_radius_m);
+    EXPECT_GT(rise, 0.0) << i;  // the plot lies on a slope
+    EXPECT_EQ(tree.dbh_m, 2.0 * (stem.section_radius_m + rise * stem.taper)) << i;
   }
 }
 

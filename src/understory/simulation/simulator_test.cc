@@ -228,6 +228,51 @@ TEST(Simulator, TrueHeightsAreThoseOfWhatStands) {
   EXPECT_GT(low, 5);
 }
 
+// By tree: diameter at breast height less the one 1.3 m above the foot, metres.
+std::map<std::string, double> uphill_differences(const std::string& folder) {
+  std::map<std::string, double> at_axis;
+  std::ifstream curves(folder + "/stem_curves.csv");
+  std::string line;
+  while (std::getline(curves, line)) {
+    std::stringstream row(line);
+    std::vector<std::string> cells;
+    for (std::string cell; std::getline(row, cell, ',');)
+      cells.push_back(cell);
+    if (cells.at(1) == "1.3") at_axis[cells[0]] = std::stod(cells.at(4));
+  }
+  std::map<std::string, double> differences;
+  std::ifstream trees(folder + "/trees.csv");
+  std::getline(trees, line);
+  while (std::getline(trees, line)) {
+    std::stringstream row(line);
+    std::vector<std::string> cells;
+    for (std::string cell; std::getline(row, cell, ',');)
+      cells.push_back(cell);
+    const double dbh = std::stod(cells.at(4));
+    if (dbh > 0.2 && at_axis.count(cells[0]) > 0) differences[cells[0]] = dbh - at_axis[cells[0]];
+  }
+  return differences;
+}
+
+TEST(Simulator, TrueBreastHeightBeginsAtTheUphillSide) {
+  for (const char* slope : {"terrain.slope_deg=0", "terrain.slope_deg=25"}) {
+    Simulator simulator(
+        load_site("demo", {"duration_s=0.2", "lidar.columns=64", "terrain.relief_m=0",
+                           "terrain.hummock_m=0", "terrain.roughness_m=0", slope}));
+    (void)read_all(simulator);
+    const test::TemporaryFolder own;
+    simulator.write_truth(own / "run.truth");
+    const std::map<std::string, double> differences = uphill_differences(own / "run.truth");
+    ASSERT_GT(differences.size(), 20U);
+    const bool even = std::string(slope).ends_with("=0");
+    for (const auto& [tree, difference] : differences) {
+      // A stem of 24 cm has its uphill side 6 cm above its foot, and loses about 1 cm a metre.
+      EXPECT_LT(difference, even ? 1e-5 : -2e-4) << tree;
+      EXPECT_GT(difference, even ? -1e-5 : -0.006) << tree;
+    }
+  }
+}
+
 TEST(Simulator, WritesItsTruth) {
   Simulator simulator(small_site());
   const std::vector<Event> events = read_all(simulator);

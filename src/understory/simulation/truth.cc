@@ -117,6 +117,19 @@ bool has_known_stem(const GrownTree& grown) {
   return grown.cloud.empty();
 }
 
+// Height of the ground at the uphill side of a stem above its foot.
+double uphill_rise_m(const GrownTree& grown, const Terrain& terrain) {
+  constexpr int kDirections = 16;
+  double highest = grown.foot.z();
+  for (int k = 0; k < kDirections; ++k) {
+    const double turn = 2.0 * M_PI * k / kDirections;
+    highest =
+        std::max(highest, terrain.height(grown.foot.x() + 0.5 * grown.dbh_m * std::cos(turn),
+                                         grown.foot.y() + 0.5 * grown.dbh_m * std::sin(turn)));
+  }
+  return highest - grown.foot.z();
+}
+
 // Over bark, from the ground to the end of the stem, in slices of a centimetre.
 double stem_volume_m3(const GrownTree& grown) {
   constexpr double kVolumeSlice = 0.01;
@@ -127,13 +140,15 @@ double stem_volume_m3(const GrownTree& grown) {
 }
 
 // As it grew: nothing of it is uncertain.
-Tree truth_of(const GrownTree& grown, const TrueCrown& crown) {
+Tree truth_of(const GrownTree& grown, const TrueCrown& crown, const Terrain& terrain) {
   Tree tree;
   tree.id = grown.id;
   tree.x = grown.foot.x();
   tree.y = grown.foot.y();
   tree.z = grown.foot.z();
-  tree.dbh_m = grown.dbh_m;
+  tree.dbh_m = has_known_stem(grown)
+                   ? grown.diameter(GrownTree::kBreastHeight + uphill_rise_m(grown, terrain))
+                   : grown.dbh_m;
   tree.species = species_name(grown.species);
   tree.height_m = stem_end_m(grown);
   tree.lean_deg = grown.lean_deg();
@@ -182,7 +197,7 @@ std::string trees_text(const SimulatedWorld& world, TimeNs start, const TruthLog
   for (const GrownTree& grown : world.stand.trees) {
     const auto seen = observations.find(grown.id);
     const auto cut = felled.find(grown.id);
-    Tree tree = truth_of(grown, crowns.of(grown));
+    Tree tree = truth_of(grown, crowns.of(grown), world.terrain);
     tree.observations = seen == observations.end() ? 0 : seen->second;
     text += fmt::format("{},{}\n", tree_csv_row(tree, 1), cut == felled.end() ? "" : cut->second);
   }

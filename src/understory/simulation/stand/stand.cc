@@ -10,7 +10,7 @@
 namespace understory {
 namespace {
 
-constexpr double kBreastHeight = 1.3;
+constexpr double kBreastHeight = GrownTree::kBreastHeight;
 
 // Shape of the stem: the share of the diameter at a height, not yet scaled to the dbh. A power of
 // the distance to the top, with a flare where the roots begin.

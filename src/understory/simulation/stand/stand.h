@@ -19,10 +19,12 @@ enum class Species { kPine, kSpruce, kBirch };
 // One standing tree, in the world frame. (sensor/tree.h has the Tree that is measured; two types of
 // one name in a namespace would share the code of their containers.)
 struct GrownTree {
+  static constexpr double kBreastHeight = 1.3;  // metres
+
   int id = 0;                                      // 1, 2, ...
   Eigen::Vector3d foot = Eigen::Vector3d::Zero();  // centre of the stem on the ground
   Species species = Species::kPine;
-  double dbh_m = 0.0;  // diameter 1.3 m above the foot
+  double dbh_m = 0.0;  // diameter 1.3 m above the foot, whatever the slope
   double height_m = 0.0;
   double crown_base_m = 0.0;  // above the foot
   double crown_radius_m = 0.0;
