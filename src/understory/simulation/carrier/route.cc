@@ -50,6 +50,12 @@ std::vector<Eigen::Vector2d> strip_road(double length_m, Random& random) {
 }  // namespace
 
 Route::Route(const CarrierConfig& config, std::uint64_t seed) {
+  make_points(config, seed);
+  stretches_ = stretches_of(points_);
+  road_stretches_ = stretches_of(roads_);
+}
+
+void Route::make_points(const CarrierConfig& config, std::uint64_t seed) {
   Random random(seed, stream_of(NoiseStream::kRoute));
   const bool strip =
       config.route == "strip" || (config.route == "auto" && config.kind == "harvester");
@@ -142,30 +148,58 @@ double Route::heading(double distance_m) const {
   return headings_[i] + u * (headings_[i + 1] - headings_[i]);
 }
 
-double Route::distance_to(const Eigen::Vector2d& place) const {
+std::vector<Route::Stretch> Route::stretches_of(const std::vector<Eigen::Vector2d>& points) {
+  constexpr std::size_t kPoints = 32;
+  std::vector<Stretch> stretches;
+  for (std::size_t first = 0; first < points.size(); first += kPoints) {
+    Stretch stretch{points[first], 0.0, first, std::min(first + kPoints, points.size())};
+    stretch.middle = 0.5 * (points[first] + points[stretch.end - 1]);
+    for (std::size_t i = first; i < stretch.end; ++i)
+      stretch.radius_m = std::max(stretch.radius_m, (points[i] - stretch.middle).norm());
+    stretches.push_back(stretch);
+  }
+  return stretches;
+}
+
+double Route::least_distance(const std::vector<Eigen::Vector2d>& points,
+                             const std::vector<Stretch>& stretches, const Eigen::Vector2d& place) {
   double best = 1e300;
-  for (const Eigen::Vector2d& point : roads_.empty() ? points_ : roads_)
-    best = std::min(best, (point - place).squaredNorm());
+  const auto look_at = [&](const Stretch& stretch) {
+    for (std::size_t i = stretch.first; i < stretch.end; ++i)
+      best = std::min(best, (points[i] - place).squaredNorm());
+  };
+  // The nearest circle first: its points rule out most of the others.
+  const auto nearest =
+      std::min_element(stretches.begin(), stretches.end(), [&](const auto& one, const auto& other) {
+        return (one.middle - place).squaredNorm() < (other.middle - place).squaredNorm();
+      });
+  if (nearest != stretches.end()) look_at(*nearest);
+  for (const Stretch& stretch : stretches) {
+    // The slack of a micrometre is for rounding.
+    const double reach = stretch.radius_m + std::sqrt(best) + 1e-6;
+    if ((stretch.middle - place).squaredNorm() < reach * reach) look_at(stretch);
+  }
   return std::sqrt(best);
 }
 
+double Route::distance_to(const Eigen::Vector2d& place) const {
+  return roads_.empty() ? least_distance(points_, stretches_, place)
+                        : least_distance(roads_, road_stretches_, place);
+}
+
 bool Route::near(const Eigen::Vector2d& place, double distance_m) const {
-  // Points far apart first: what is far from them is far from all.
-  constexpr std::size_t kStride = 40;
-  const double slack = distance_m + step_m_ * kStride;
-  bool maybe = false;
-  for (std::size_t i = 0; i < points_.size() && !maybe; i += kStride)
-    maybe = (points_[i] - place).squaredNorm() < slack * slack;
-  return maybe && distance_to(place, 0.0, 1.0) < distance_m;
+  return least_distance(points_, stretches_, place) < distance_m;
 }
 
 double Route::distance_to(const Eigen::Vector2d& place, double from, double to) const {
+  if (from <= 0.0 && to >= 1.0) return least_distance(points_, stretches_, place);
   const auto index = [&](double share) {
     return static_cast<std::size_t>(
         std::lround(std::clamp(share, 0.0, 1.0) * static_cast<double>(points_.size() - 1)));
   };
+  const std::size_t last = index(to);
   double best = 1e300;
-  for (std::size_t i = index(from); i <= index(to); ++i)
+  for (std::size_t i = index(from); i <= last; ++i)
     best = std::min(best, (points_[i] - place).squaredNorm());
   return std::sqrt(best);
 }

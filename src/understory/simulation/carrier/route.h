@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -33,16 +34,30 @@ class Route {
   [[nodiscard]] double distance_to(const Eigen::Vector2d& place, double from, double to) const;
 
  private:
+  void make_points(const CarrierConfig& config, std::uint64_t seed);
   void resample(const std::vector<Eigen::Vector2d>& dense, double length_m);
   void repeat(int rounds);
   void make_roads(const CarrierConfig& config, Random& random);
 
+  // Points that follow each other, and a circle around them. A search skips whole circles.
+  struct Stretch {
+    Eigen::Vector2d middle;
+    double radius_m = 0.0;
+    std::size_t first = 0;
+    std::size_t end = 0;
+  };
+  static std::vector<Stretch> stretches_of(const std::vector<Eigen::Vector2d>& points);
+  static double least_distance(const std::vector<Eigen::Vector2d>& points,
+                               const std::vector<Stretch>& stretches, const Eigen::Vector2d& place);
+
   double step_m_ = 0.25;
   std::vector<Eigen::Vector2d> points_;  // step_m_ apart
+  std::vector<Stretch> stretches_;       // of points_
   std::vector<double> headings_;
   // Points along all roads of the stand where there are several: the same whichever is driven, so
   // that the trees beside them are. Those of one round where there are several.
   std::vector<Eigen::Vector2d> roads_;
+  std::vector<Stretch> road_stretches_;  // of roads_
 };
 
 }  // namespace understory

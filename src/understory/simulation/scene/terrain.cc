@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "understory/simulation/sensors/counter_noise.h"
@@ -84,7 +85,9 @@ Terrain::Terrain(const TerrainConfig& config, double half_x_m, double half_y_m, 
   const double bare = 1.0 / (1.0 + 8.0 * config.snow_m);
   const double half_m = std::max(half_x_m, half_y_m);
   heights_.reserve(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+  const bool ruts = way != nullptr && config.snow_m * config.track_depth > 0.0;
   for (int row = 0; row < rows_; ++row) {
+    double no_rut_to_x = -std::numeric_limits<double>::infinity();
     for (int column = 0; column < columns_; ++column) {
       const double x = west_m_ + cell_m_ * column;
       const double y = south_m_ + cell_m_ * row;
@@ -97,8 +100,10 @@ Terrain::Terrain(const TerrainConfig& config, double half_x_m, double half_y_m, 
                       hummock * (0.9 * hummocks.at(x, y) + 0.43 * tufts.at(x, y)) +
                       roughness * noise.normal();
       height -= ditch_depth(config, x, y, half_m);
-      if (way != nullptr && config.snow_m * config.track_depth > 0.0 && way->near({x, y}, 1.6)) {
-        height -= rut_depth(config, way->distance_to({x, y}));
+      if (ruts && x > no_rut_to_x) {
+        const double away = way->distance_to({x, y}, 0.0, 1.0) - 1.6;
+        if (away < 0.0) height -= rut_depth(config, way->distance_to({x, y}));
+        no_rut_to_x = x + away - 1e-6;
       }
       heights_.push_back(height);
     }
