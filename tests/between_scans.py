@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "bad_input"))
-from program import Cases, program
+from program import Cases, program, simulated
 
 cases = Cases()
-SHORT = "sim:harvester?seed=5&duration_s=14"
+SHORT = simulated("harvester", 5, 14)
 
 
 def poses(file):
@@ -25,12 +25,16 @@ def mapped(run, *more):
     return run
 
 
+PLAIN = mapped(cases.folder / "plain")
+PREDICTED = mapped(cases.folder / "predicted", "--imu-rate")
+
+
 @cases.case("a prediction for each sample of the IMU, and no other file changes")
 def each_sample(folder):
-    plain, run = mapped(folder / "plain"), mapped(folder / "imu", "--imu-rate")
-    assert not (plain / "trajectory_imu.tum").exists()
+    run = PREDICTED
+    assert not (PLAIN / "trajectory_imu.tum").exists()
     for name in ("trajectory.tum", "map.laz", "trees.csv"):
-        assert (run / name).read_bytes() == (plain / name).read_bytes(), f"{name} differs"
+        assert (run / name).read_bytes() == (PLAIN / name).read_bytes(), f"{name} differs"
     scans, predicted = poses(run / "trajectory.tum"), poses(run / "trajectory_imu.tum")
     counts = json.loads((run / "run.json").read_text())["counts"]
     assert counts["imu_predictions"] == len(predicted) and counts["imu_predictions_coasted"] == 0, counts
@@ -46,9 +50,8 @@ def each_sample(folder):
 
 @cases.case("edges of the graph know what each match told, not the length of the way alone")
 def edges(folder):
-    run = mapped(folder / "run", "--set", "map.enabled=false")
     unequal = 0
-    lines = [line.split() for line in (run / "graph.g2o").read_text().splitlines() if line.startswith("EDGE_SE3")]
+    lines = [line.split() for line in (PLAIN / "graph.g2o").read_text().splitlines() if line.startswith("EDGE_SE3")]
     for line in lines:
         information = [float(cell) for cell in line[10:]]  # upper triangle, translation first
         xx, yy, zz = information[0], information[6], information[11]
@@ -58,10 +61,10 @@ def edges(folder):
 
 @cases.case("quarters of scans give four poses a scan, and no other file changes")
 def quarters(folder):
-    plain, run = mapped(folder / "plain"), mapped(folder / "parts", "--set", "scan_fraction=0.25")
-    assert not (plain / "trajectory_partial.tum").exists()
+    run = mapped(folder / "parts", "--set", "scan_fraction=0.25")
+    assert not (PLAIN / "trajectory_partial.tum").exists()
     for name in ("trajectory.tum", "map.laz", "trees.csv"):
-        assert (run / name).read_bytes() == (plain / name).read_bytes(), f"{name} differs"
+        assert (run / name).read_bytes() == (PLAIN / name).read_bytes(), f"{name} differs"
     scans, parts = poses(run / "trajectory.tum"), poses(run / "trajectory_partial.tum")
     facts = json.loads((run / "run.json").read_text())
     counts, quality = facts["counts"], facts["quality"]
@@ -78,7 +81,7 @@ def quarters(folder):
 
 @cases.case("a run that is moved moves its predictions")
 def moved(folder):
-    run, to, fixes = mapped(folder / "imu", "--imu-rate"), folder / "moved", folder / "fixes.csv"
+    run, to, fixes = PREDICTED, folder / "moved", folder / "fixes.csv"
     scans = poses(run / "trajectory.tum")
     fixes.write_text("timestamp,latitude_deg,longitude_deg,height_m\n" + "".join(
         f"{time},{62 + place[1] / 111e3:.9f},{29 + place[0] / 52e3:.9f},100\n" for time, place in scans.items()))
@@ -94,7 +97,7 @@ def moved(folder):
 
 @cases.case("without an IMU nothing is mapped, and the message says why")
 def no_imu(folder):
-    silent = program("map", f"{SHORT}&imu.enabled=false", "-o", folder / "none", "--imu-rate")
+    silent = program("map", "sim:harvester?seed=5&duration_s=14&imu.enabled=false", "-o", folder / "none", "--imu-rate")
     assert silent.returncode == 3 and "expected an IMU" in silent.stderr, silent.stderr
     for more in (["--front-end", "sparse"], ["--set", "motion.imu_enabled=false"]):
         refused = program("map", SHORT, "-o", folder / "none", "--imu-rate", *more)

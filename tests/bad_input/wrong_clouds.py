@@ -13,8 +13,8 @@ from program import Cases, program, simulated
 
 cases = Cases()
 SIDE = 20.0
-WALK = simulated("demo", 6, 16, "lidar.model=VLP-16", "gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02",
-                 "gnss.white_sd_m=0.02")  # that of world_frame.py
+WALK = simulated("demo", 6, 12, "lidar.model=VLP-16", "gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02",
+                 "gnss.white_sd_m=0.02", "stand.size_x_m=40", "stand.size_y_m=40", "stand.trees_per_ha=400")  # that of world_frame.py
 
 
 def places(seed, count=24):

@@ -100,7 +100,7 @@ def tool(name, *words):
     return done.stdout
 
 
-RECORDING = simulated("demo", 4, 24, "lidar.model=VLP-16", *GOOD_SKY)
+RECORDING = simulated("demo", 4, 16, "lidar.model=VLP-16", *GOOD_SKY, "stand.size_x_m=40", "stand.size_y_m=40", "stand.trees_per_ha=400")
 RUN, LOCAL = cases.folder / "run", cases.folder / "local"
 FIRST = program("map", RECORDING, "-o", RUN)
 SECOND = program("map", RECORDING, "-o", LOCAL, "--set", "georeference.enabled=false")

@@ -131,8 +131,8 @@ def both(*arguments, codes=(0,), **runs):
     return said
 
 
-RECORDING = simulated("demo", 6, 16, "lidar.model=VLP-16", "gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02",
-                      "gnss.white_sd_m=0.02")
+RECORDING = simulated("demo", 6, 12, "lidar.model=VLP-16", "gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02",
+                      "gnss.white_sd_m=0.02", "stand.size_x_m=40", "stand.size_y_m=40", "stand.trees_per_ha=400")
 TRUTH = RECORDING.with_suffix(".truth")
 DENSE_RUNS = mapped("dense", RECORDING, "--imu-rate", "--set", "scan_fraction=0.5", "--inventory", "full", "--plot-grid", 10)
 STEM_RUNS = mapped("stems", RECORDING, "--front-end", "sparse", "--set", "harvester.fells=true")
