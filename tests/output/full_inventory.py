@@ -170,7 +170,7 @@ def check_foreign_clouds(run_map, folder):
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        walk = simulated("handheld", 3, 16, "gnss.enabled=false")
+        walk = simulated("handheld", 3, 16, "gnss.enabled=false", "stand.size_x_m=70", "stand.size_y_m=70", "carrier.length_m=150")
         truth = walk.with_suffix(".truth")
         run("map", walk, "-o", folder / "run", "--inventory", "full")
         points = json.loads((folder / "run/run.json").read_text())["counts"]["map_points"]

@@ -103,7 +103,7 @@ def add_scaled_scan(file, points):
 
 with tempfile.TemporaryDirectory() as scratch:
     room = Path(scratch)
-    run("map", "sim:demo?seed=3&duration_s=12&lidar.columns=512", "-o", room / "run")
+    run("map", "sim:demo?seed=3&duration_s=8&lidar.columns=512&stand.size_x_m=40&stand.size_y_m=40&stand.trees_per_ha=400", "-o", room / "run")
     points = laspy.read(room / "run" / "map.laz").xyz
     points = points - np.round(np.median(points, axis=0))  # they are in a coordinate system
     points = points[np.abs(points).max(axis=1) < 50.0]
