@@ -50,7 +50,9 @@ def check(folder, recording, name, *options, tiled=True):
 def main():
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        handheld, harvester = simulated("handheld", 19, 8), simulated("harvester", 6, 8)
+        small = ("stand.size_x_m=60", "stand.size_y_m=60")
+        handheld = simulated("handheld", 19, 8, *small, "carrier.length_m=120")
+        harvester = simulated("harvester", 6, 8, *small, "carrier.length_m=60")
         world = check(folder, handheld, "world", "--set", "georeference.enabled=false")
         assert world == check(folder, handheld, "grid", "--crs", "EPSG:3067", tiled=False)
         assert world == check(folder, handheld, "degrees", "--crs", "EPSG:4979")
