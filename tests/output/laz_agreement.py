@@ -160,7 +160,8 @@ def check_points_by_laspy(folder):
 with tempfile.TemporaryDirectory() as scratch:
     scratch = Path(scratch)
     recording = scratch / "walk.mcap"
-    run("simulate", "demo", "-o", recording, "--set", "duration_s=8", "--set", "seed=4", "--set", "gnss.enabled=false")
+    run("simulate", "demo", "-o", recording, "--set", "duration_s=8", "--set", "seed=4", "--set", "gnss.enabled=false", "--set", "lidar.columns=512",
+        "--set", "stand.size_x_m=40", "--set", "stand.size_y_m=40")
     run("map", recording, "-o", scratch / "run")
     las, facts = check_map(scratch / "run")
     print("map.laz:", facts["counts"]["map_points"], "points read by laspy")
