@@ -8,7 +8,7 @@ from program import Cases, map_recording, program
 from recordings import Message, edit_cloud, write_mcap
 
 cases = Cases()
-SMALL = ["stand.size_x_m=60", "stand.size_y_m=60", "gnss.enabled=false", "carrier.length_m=30"]
+SMALL = ["stand.size_x_m=60", "stand.size_y_m=60", "gnss.enabled=false", "carrier.length_m=30", "carrier.turn_interval_s=3"]
 SECONDS = 12
 BOTH = ("--lidar-topic", "/lidar,/lidar_2")
 
@@ -22,6 +22,25 @@ def simulated(name, *settings, seconds=SECONDS):
 
 
 WALK = simulated("walk.mcap")
+START = 1_700_000_000 * 10**9  # of every simulation
+
+
+def messages_of(recording):
+    with open(recording, "rb") as file:
+        return [Message(channel.topic, schema.name, message.log_time, message.data)
+                for schema, channel, message in make_reader(file).iter_messages()]
+
+
+def rewritten(path, recording, change):
+    """The recording with what `change` makes of each message; without those of which it makes nothing."""
+    made = [new for message in messages_of(recording) if (new := change(message))]
+    write_mcap(path, sorted(made, key=lambda m: m.time))
+    return path
+
+
+def behind(offsets_s):
+    """Clocks of lidars that are off, by topic, as the simulation plays them: what is late arrives late."""
+    return lambda m: m.at(m.stamp + round(1e9 * offsets_s[m.topic])) if m.topic in offsets_s else m
 
 
 def info_of(recording, *options):
@@ -68,7 +87,9 @@ def converted(folder):
 
 @cases.case("one that dies leaves the other: partial, with the time")
 def dies(folder):
-    outcome = map_recording(simulated("dies.mcap", "second_lidar.ends_s=6"), folder / "run", *BOTH)
+    recording = rewritten(folder / "dies.mcap", WALK,
+                          lambda m: m if m.topic != "/lidar_2" or m.time < START + 6e9 else None)
+    outcome = map_recording(recording, folder / "run", *BOTH)
     assert outcome.code == 4 and outcome.run["status"] == "partial", (outcome.code, outcome.run["status"])
     warning = outcome.warnings["recording.silent_lidar"]
     assert warning["count"] == 1 and "/lidar_2 gives nothing after 1700000005.9" in warning["message"], warning
@@ -77,8 +98,9 @@ def dies(folder):
 
 
 @cases.case("one that begins late joins, and all its points are read")
-def late(folder):
-    recording = simulated("late.mcap", "second_lidar.begins_s=5")
+def begins_late(folder):
+    recording = rewritten(folder / "late.mcap", WALK,
+                          lambda m: m if m.topic != "/lidar_2" or m.stamp >= START + 5e9 else None)
     outcome = map_recording(recording, folder / "run", *BOTH)
     assert outcome.code == 0 and "recording.silent_lidar" not in outcome.warnings, outcome.said
     warning = outcome.warnings["recording.late_lidar"]
@@ -92,9 +114,10 @@ def late(folder):
 def differing_clocks(folder):
     assert not {"lidars.clock", "lidars.place"} & set(map_recording(WALK, folder / "right", *BOTH).warnings)
     said = []
+    longer = simulated("longer.mcap", "stand.size_x_m=100", "stand.size_y_m=100", "carrier.length_m=60",
+                       "carrier.turn_interval_s=10", seconds=25)
     for late_s, status in ((0.02, "complete"), (0.1, "untrusted")):
-        recording = simulated(f"late{late_s}.mcap", f"second_lidar.time_offset_s={late_s}", "stand.size_x_m=100",
-                              "stand.size_y_m=100", "carrier.length_m=60", seconds=25)
+        recording = rewritten(folder / f"late{late_s}.mcap", longer, behind({"/lidar_2": late_s}))
         outcome = map_recording(recording, folder / f"run{late_s}", *BOTH)
         assert outcome.run["status"] == status, (late_s, outcome.run["status"], outcome.said)
         warning = outcome.warnings["lidars.clock"]["message"]
@@ -115,10 +138,7 @@ def millimetres(folder):
         cloud.points = bytearray(values.tobytes())
 
     spoilt = folder / "mm.mcap"
-    with open(WALK, "rb") as file:
-        messages = [Message(channel.topic, schema.name, message.log_time, message.data)
-                    for schema, channel, message in make_reader(file).iter_messages()]
-    write_mcap(spoilt, [edit_cloud(m, scale) if m.topic == "/lidar_2" else m for m in messages])
+    rewritten(spoilt, WALK, lambda m: edit_cloud(m, scale) if m.topic == "/lidar_2" else m)
     outcome = map_recording(spoilt, folder / "run", *BOTH)
     assert outcome.code == 4 and outcome.run["status"] == "partial", (outcome.code, outcome.run["status"])
     warning = outcome.warnings["recording.silent_lidar"]
@@ -146,8 +166,7 @@ def places(folder):
 
 @cases.case("the clocks of two lidars are found and taken out")
 def clocks(folder):
-    recording = simulated("clocks.mcap", "lidar.time_offset_s=0.03", "second_lidar.time_offset_s=-0.03",
-                          "carrier.turn_interval_s=3")
+    recording = rewritten(folder / "clocks.mcap", WALK, behind({"/lidar": 0.03, "/lidar_2": -0.03}))
     done = program("calibrate", "lidars", recording, *BOTH, "-o", folder / "rig")
     found = json.loads((folder / "rig" / "calibration.json").read_text())
     unsure = [lidar["topic"] for lidar in found["lidars"] if lidar["sd_s"] > 1e-3]
