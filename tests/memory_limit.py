@@ -48,7 +48,9 @@ def killed_among_tiles(recording, run, least):
 
 with tempfile.TemporaryDirectory() as scratch:
     scratch = Path(scratch)
-    recording, free, tight, cut = simulated("handheld", 5, 9), scratch / "free", scratch / "tight", scratch / "cut"
+    recording = simulated("handheld", 5, 9, "stand.size_x_m=60", "stand.size_y_m=60", "carrier.length_m=120",
+                          "stand.trees_per_ha=300")
+    free, tight, cut = scratch / "free", scratch / "tight", scratch / "cut"
     status = program(*map_command(recording, free)).returncode
     assert status in (0, 4)
 
