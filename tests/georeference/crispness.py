@@ -16,7 +16,8 @@ import numpy
 cases = Cases()
 MOST_NATS = 0.02
 MOST_APE = (1.05, 0.001)  # times that without positions, and metres more
-SITE = ("lidar.model=VLP-16", "gnss.jump_interval_s=10", "gnss.jump_m=10", "gnss.burst_interval_s=15", "gnss.burst_m=10")
+SITE = ("lidar.model=VLP-16", "gnss.jump_interval_s=10", "gnss.jump_m=10", "gnss.burst_interval_s=15", "gnss.burst_m=10",
+        "stand.size_x_m=40", "stand.size_y_m=40", "stand.trees_per_ha=400")
 
 
 def answer(*words):
@@ -66,7 +67,7 @@ def written(path, points):
 @cases.case("the entropy of a piece of the cloud is that of the definition, for any radius, and grows where it blurs")
 def definition(folder):
     run = folder / "run"
-    done = program("map", "sim:demo?seed=7&duration_s=8&lidar.model=VLP-16", "-o", run)
+    done = program("map", "sim:demo?seed=7&duration_s=8&lidar.model=VLP-16&stand.size_x_m=40&stand.size_y_m=40", "-o", run)
     assert done.returncode in (0, 4), done.stderr
     cloud = laspy.read(run / "map.laz")
     points = numpy.column_stack((cloud.x, cloud.y, cloud.z))
