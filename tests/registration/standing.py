@@ -20,7 +20,7 @@ cases = Cases()
 STAND_S = 25
 SITE = ["carrier.route=strip", "carrier.one_way=true", "carrier.length_m=36", "carrier.halts=1",
         f"carrier.halt_s={STAND_S}", "carrier.route_time_s=0", "lidar.rate_hz=5", "lidar.snow_fall_per_m=0",
-        "lidar.snow_drop_interval_s=0", "lidar.crosstalk=0", "truth.points=true"]
+        "lidar.snow_drop_interval_s=0", "lidar.crosstalk=0", "truth.points=true", "stand.size_x_m=280", "stand.size_y_m=280"]
 OFF_M = 0.05
 STILL_M_S = 0.05
 CELL_M = 0.06  # of the search for the nearest true point, above OFF_M
