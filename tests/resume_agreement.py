@@ -23,7 +23,7 @@ CASES = {
     "sparse_scans": (("lieksa2", 21, 60), "journal.bin", 60_000,
                      ["--set", "keyframe.distance_m=0.4"], DENSE),
     # Far points of the scans between are kept, too.
-    "full_inventory": (("handheld", 21, 10), "far_clouds.bin", 3_000_000, ["--inventory", "full"],
+    "full_inventory": (("handheld", 5, 9), "far_clouds.bin", 3_000_000, ["--inventory", "full"],
                        [*DENSE, "stem_curves.csv"]),
     "stems": (("lieksa2", 21, 60), "views.bin", 100_000,
               ["--front-end", "sparse", "--set", "run.checkpoint_interval_s=2"], STEMS),

@@ -83,7 +83,10 @@ WALK = simulated("handheld", 5, 9)
 TWO_LIDARS = simulated("harvester2", 5, 4)
 prepared("map", RIDE, "-o", "dense")
 prepared("map", RIDE, "-o", "stems", "--front-end", "sparse")
-prepared("map", "sim:skidoo?seed=5&duration_s=8", "-o", "ride")
+PLACED = simulated("demo", 4, 16, "lidar.model=VLP-16", "gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02", "gnss.white_sd_m=0.02",
+                   "gnss.jump_interval_s=0", "gnss.burst_interval_s=0", "stand.size_x_m=40", "stand.size_y_m=40",
+                   "stand.trees_per_ha=400")  # that of layers_on_globe.py
+prepared("map", PLACED, "-o", "ride")
 prepared("georeference", "ride", "-o", "globe", "--method", "gnss-path")
 prepared("convert", RIDE, "clouds", "--format", "ply")
 clouds = [f"../../clouds/{i:06}.ply" for i in (0, 4)]

@@ -44,7 +44,7 @@ def main():
     boxes.write_text("boxes:\n  - {name: far, frame: body, center_m: [50, 0, 90], size_m: [1, 1, 1]}\n")
     told, _, told_on_path, _, _ = mapped(machine, folder, f"preprocess.machine_boxes_file={boxes}")
     assert told_on_path == kept_on_path and "carrier_points" not in told["counts"]
-    walk, _, _, said, _ = mapped(simulated("handheld", 7, 8), folder)
+    walk, _, _, said, _ = mapped(simulated("handheld", 5, 9), folder)
     assert "carrier_points" not in walk["counts"] and "carries the lidar" not in said
 
 
