@@ -150,6 +150,23 @@ TEST(Route, RoundsLieOnEachOther) {
   }
 }
 
+TEST(Route, DistanceIsThatOfTheNearestPoint) {
+  for (const char* site : {"handheld", "skidoo", "harvester"}) {
+    const SiteConfig config = load_site(site, {});
+    const Route route(config.carrier, 7);
+    for (double x = -130.0; x < 130.0; x += 37.0) {
+      for (double y = -120.0; y < 120.0; y += 31.0) {
+        double least = 1e300;
+        for (double along = 0.0; along <= route.length_m() + 1e-6; along += 0.25)
+          least = std::min(least, (route.place(along) - Eigen::Vector2d(x, y)).norm());
+        EXPECT_NEAR(route.distance_to({x, y}, 0.0, 1.0), least, 1e-6) << site;
+        EXPECT_EQ(route.near({x, y}, least + 0.1), true) << site;
+        EXPECT_EQ(route.near({x, y}, least - 0.1), false) << site;
+      }
+    }
+  }
+}
+
 TEST(CarrierPath, TurnsOnTheSpotBeforeItLeaves) {
   for (const std::string kind : {"walk", "harvester", "uav"}) {
     for (const double turn_deg : {60.0, -60.0}) {
