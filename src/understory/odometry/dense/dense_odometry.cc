@@ -286,6 +286,7 @@ void DenseOdometry::match_elastically(const Scan& scan, const MatchTarget& targe
   const std::vector<StampedPose> path = corrected_path(guess, start, duration, correction);
   preprocess(scan, path, estimate);
   estimate.match.target_from_source = path.front().world_from_body;
+  estimate.stamp_from_middle = motion_until(path, scan.stamp + duration / 2);
 }
 
 void DenseOdometry::match(const MatchTarget& local_map, const NavState& predicted,

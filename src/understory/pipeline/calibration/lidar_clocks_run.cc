@@ -32,13 +32,13 @@ LidarClock find_clock(const LidarClocksRequest& request, const NamedLidar& lidar
   clock.topic = lidar.topic;
   const OpenOptions open = options_for(lidar, request.open);
   InertialRecording read = read_samples(request.recording, open, log, progress);
-  const std::vector<StampedPose> path =
-      mapped_lidar_path(request.recording, open, scratch, read.rig, progress, doubts);
+  const LidarPath path = mapped_lidar_path(request.recording, open, scratch, read.rig, progress);
+  doubts = path.doubts;
   const Pose start = read.rig.body_from_imu
                          ? read.rig.body_from_lidar.inverse() * *read.rig.body_from_imu
                          : Pose();
   clock.rig = read.rig;
-  clock.result = calibrate_lidar_imu(path, read.samples, start, 0.0);
+  clock.result = calibrate_lidar_imu(path.world_from_lidar, read.samples, start, 0.0);
   if (!clock.result.problem.empty())
     throw InputError(request.recording, "", lidar.topic + ": " + clock.result.problem);
   clock.late_s = lidar.late_s - clock.result.imu_late_s;

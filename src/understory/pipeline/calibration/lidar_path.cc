@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <limits>
 #include <memory>
 #include <system_error>
 #include <utility>
@@ -17,27 +19,36 @@ namespace {
 
 constexpr const char* kMappedFolder = "mapped";  // removed in the end
 
-// The path of the body as the lidar alone tells it.
-Trajectory mapped_path(const std::string& recording, const OpenOptions& open,
-                       const std::filesystem::path& folder, const ProgressSink& progress,
-                       std::vector<std::string>& doubts) {
-  Log unheard;  // that the IMU is not used, and the like
-  MappingRequest mapping;
-  mapping.recording = recording;
-  mapping.run_folder = folder;
-  mapping.open = open;
-  ReadConfig<FrontEndConfig> read =
-      read_front_end_config(kDenseFrontEnd, "", "",
-                            {"motion.imu_enabled=false", "loop_closure.enabled=false",
-                             "map.enabled=false", "georeference.online=false"},
-                            unheard);
-  mapping.config = std::move(read.config);
-  mapping.config_record.origins = std::move(read.origins);
-  mapping.config_record.asked_yaml = yaml_of(mapping.config);
-  const RunOutcome outcome =
-      run_mapping(begin_mapping(std::move(mapping)), unheard, progress, [] { return false; });
-  if (outcome.status == RunStatus::kUntrusted) doubts = outcome.reasons;
-  return read_trajectory(folder / "trajectory.tum");
+// Takes the middles of the scans as they are matched.
+class MiddlesOfScans {
+ public:
+  void take(const PositionedScan& scan) {
+    if (scan.pose.stamp <= last_) poses_.clear();  // the recording is begun anew
+    last_ = scan.pose.stamp;
+    if (const auto& moved = scan.new_world_from_old_world) {
+      for (StampedPose& pose : poses_)
+        pose.world_from_body = *moved * pose.world_from_body;
+    }
+    const auto& middle = scan.matched_middle;
+    if (middle && (poses_.empty() || middle->stamp > poses_.back().stamp))
+      poses_.push_back(*middle);
+  }
+  [[nodiscard]] const std::vector<StampedPose>& poses() const { return poses_; }
+
+ private:
+  std::vector<StampedPose> poses_;  // world_from_body
+  TimeNs last_ = std::numeric_limits<TimeNs>::min();
+};
+
+std::vector<std::string> settings_of(bool with_imu) {
+  return {with_imu ? "refine_imu=true" : "motion.imu_enabled=false",
+          "loop_closure.enabled=false", "map.enabled=false", "georeference.online=false"};
+}
+
+bool imu_was_refused(const Log& log) {
+  const std::vector<Log::Warning> warnings = log.warnings();
+  return std::any_of(warnings.begin(), warnings.end(),
+                     [](const Log::Warning& warning) { return warning.key == "imu.untrusted"; });
 }
 
 }  // namespace
@@ -57,17 +68,33 @@ InertialRecording read_samples(const std::string& recording, const OpenOptions& 
   return read;
 }
 
-std::vector<StampedPose> mapped_lidar_path(const std::string& recording, const OpenOptions& open,
-                                           const std::filesystem::path& folder, const Rig& rig,
-                                           const ProgressSink& progress,
-                                           std::vector<std::string>& doubts) {
-  std::vector<StampedPose> poses;
+LidarPath mapped_lidar_path(const std::string& recording, const OpenOptions& open,
+                            const std::filesystem::path& folder, const Rig& rig,
+                            const ProgressSink& progress, const std::optional<RefinedImu>& imu) {
   const std::filesystem::path scratch = folder / kMappedFolder;
-  for (const StampedPose& pose : mapped_path(recording, open, scratch, progress, doubts))
-    poses.push_back({pose.stamp, pose.world_from_body * rig.body_from_lidar});
+  Log unheard;  // that the IMU is not used, and the like
+  MiddlesOfScans middles;
+  MappingRequest mapping;
+  mapping.recording = recording;
+  mapping.run_folder = scratch;
+  mapping.open = open;
+  mapping.conditions.imu_refined = imu;
+  mapping.on_positioned = [&](const PositionedScan& scan) { middles.take(scan); };
+  ReadConfig<FrontEndConfig> read =
+      read_front_end_config(kDenseFrontEnd, "", "", settings_of(imu.has_value()), unheard);
+  mapping.config = std::move(read.config);
+  mapping.config_record.origins = std::move(read.origins);
+  mapping.config_record.asked_yaml = yaml_of(mapping.config);
+  const RunOutcome outcome =
+      run_mapping(begin_mapping(std::move(mapping)), unheard, progress, [] { return false; });
+  LidarPath path;
+  if (outcome.status == RunStatus::kUntrusted) path.doubts = outcome.reasons;
+  if (imu && imu_was_refused(unheard)) path.doubts.emplace_back("the scans contradict the IMU");
+  for (const StampedPose& pose : middles.poses())
+    path.world_from_lidar.push_back({pose.stamp, pose.world_from_body * rig.body_from_lidar});
   std::error_code ignored;
   std::filesystem::remove_all(scratch, ignored);
-  return poses;
+  return path;
 }
 
 std::vector<StampedPose> lidar_path_of_file(const std::string& file) {

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "understory/geometry/stamped_pose.h"
 #include "understory/odometry/imu/imu_buffer.h"
+#include "understory/pipeline/mapping/adaptation.h"
 #include "understory/recording/recording.h"
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
@@ -22,12 +24,21 @@ struct InertialRecording {
 [[nodiscard]] InertialRecording read_samples(const std::string& recording, const OpenOptions& open,
                                              Log& log, const ProgressSink& progress);
 
-// The path of the lidar that `open` names as that lidar alone tells it, world_from_lidar: the
-// recording is mapped without the IMU. `folder`: of files that are removed in the end. `doubts`:
-// why the path is not to be trusted, if it is not.
-[[nodiscard]] std::vector<StampedPose> mapped_lidar_path(
-    const std::string& recording, const OpenOptions& open, const std::filesystem::path& folder,
-    const Rig& rig, const ProgressSink& progress, std::vector<std::string>& doubts);
+// The path of a lidar, and why it is not to be trusted, if it is not.
+struct LidarPath {
+  std::vector<StampedPose> world_from_lidar;
+  std::vector<std::string> doubts;
+};
+
+// The path of the lidar that `open` names, by mapping the recording. A scan has one pose, at its
+// middle and by its match alone: that hardly depends on how the scan was deskewed. `imu`: place and
+// clock of the IMU, which deskews the scans and is refined on the way; else lidar alone.
+// `folder`: of files that are removed in the end. With an IMU that the scans contradict it is
+// doubted.
+[[nodiscard]] LidarPath mapped_lidar_path(const std::string& recording, const OpenOptions& open,
+                                          const std::filesystem::path& folder, const Rig& rig,
+                                          const ProgressSink& progress,
+                                          const std::optional<RefinedImu>& imu = std::nullopt);
 
 // world_from_lidar of a TUM file.
 [[nodiscard]] std::vector<StampedPose> lidar_path_of_file(const std::string& file);

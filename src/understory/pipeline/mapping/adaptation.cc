@@ -88,7 +88,7 @@ void suit_scans_alone(const DenseMappingConfig& config, const SensorTraits& trai
     why = "the IMU is switched off";
   } else if (traits.imu_is_numb) {
     why = "the IMU's samples are not numbers";
-  } else if (!traits.has_imu) {
+  } else if (!traits.has_imu && !conditions.imu_refined) {
     why = "no IMU whose place is known";
   } else if (!conditions.imu_refused.empty() || conditions.imu_doubted) {
     why = "the IMU contradicts them";

@@ -189,6 +189,7 @@ void EventLoop::note_positioned(const std::vector<PositionedScan>& scans) {
   for (const PositionedScan& scan : scans) {
     if (player_ != nullptr) latencies_ms_.push_back(player_->latency_ms(scan.end));
     if (online_) online_->take(scan);
+    if (request_.on_positioned) request_.on_positioned(scan);
   }
 }
 

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "understory/pipeline/mapping/adaptation.h"
 #include "understory/pipeline/mapping/front_end_config.h"
+#include "understory/pipeline/mapping/positioned_scan.h"
 #include "understory/pipeline/mapping/sensor_traits.h"
 #include "understory/pipeline/run_folder/input_identity.h"
 #include "understory/recording/recording.h"
@@ -26,6 +28,9 @@ struct MappingRequest {
   // What the run found out itself, and goes on from when it is resumed.
   SensorTraits traits;
   RunConditions conditions;
+  // Told of each scan that has got its pose, in order of time. A recording that is begun anew is
+  // told from its beginning. Empty: nobody listens.
+  std::function<void(const PositionedScan&)> on_positioned;
   // Of a resumed run: where it was begun, if that is not the current folder; else empty.
   std::filesystem::path begun_in;
 

@@ -13,6 +13,9 @@ struct PositionedScan {
   // The world frame of this pose from that of the poses before, where it was moved since.
   std::optional<Pose> new_world_from_old_world;
   bool begins_piece = false;  // how it lies to the poses before is not known
+  // At the middle of the scan, by its match alone, in the world of `pose`. None where no match was
+  // accepted, and none by stems.
+  std::optional<StampedPose> matched_middle;
 };
 
 }  // namespace understory

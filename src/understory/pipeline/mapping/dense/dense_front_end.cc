@@ -284,6 +284,7 @@ void DenseFrontEnd::on_scan(const Scan& scan) {
   record.matched_points = static_cast<std::uint32_t>(estimate.thinned.size());
   record.map_size = local_map_size;
   note_outcome(estimate, record);
+  note_middle(estimate, record);
   check_clock(estimate, record);
   update_map(estimate, record);
   record.wall_ms = static_cast<float>(timer.wall_ms());
@@ -393,6 +394,8 @@ void DenseFrontEnd::move_world(const Pose& new_world_from_old_world) {
   std::optional<Pose>& so_far = positioned_.new_world_from_old_world;
   so_far = so_far ? new_world_from_old_world * *so_far : new_world_from_old_world;
   positioned_.pose.world_from_body = new_world_from_old_world * positioned_.pose.world_from_body;
+  if (std::optional<StampedPose>& middle = positioned_.matched_middle)
+    middle->world_from_body = new_world_from_old_world * middle->world_from_body;
 }
 
 }  // namespace understory

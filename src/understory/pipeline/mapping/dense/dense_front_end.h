@@ -177,6 +177,7 @@ class DenseFrontEnd : public FrontEnd {
   void watch_memory();
   void move_world(const Pose& new_world_from_old_world);
   void note_outcome(const DenseEstimate& estimate, ScanRecord& record);
+  void note_middle(const DenseEstimate& estimate, const ScanRecord& record);
   void check_clock(const DenseEstimate& estimate, const ScanRecord& record);
   void refine_rig();
 

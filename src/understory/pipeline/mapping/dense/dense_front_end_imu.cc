@@ -5,9 +5,18 @@ namespace understory {
 
 // What a run before this one found stands in the place of what is given.
 void DenseFrontEnd::refine_rig() {
-  if (!conditions_.imu_refined || !rig_.body_from_imu) return;
+  if (!conditions_.imu_refined || without_samples()) return;
   rig_.body_from_imu = conditions_.imu_refined->body_from_imu;
   rig_.imu_extrinsic_source = "refined by the recording";
+}
+
+// A scan's middle is what its match knows best, whatever its points were deskewed by.
+void DenseFrontEnd::note_middle(const DenseEstimate& estimate, const ScanRecord& record) {
+  if (!estimate.matched || record.outcome != ScanOutcome::kMatched) return;
+  const Pose middle = estimate.match.target_from_source * estimate.stamp_from_middle;
+  const auto& levelled = estimate.update.new_world_from_old_world;
+  positioned_.matched_middle = {record.stamp + (estimate.scan_end - record.stamp) / 2,
+                                levelled ? *levelled * middle : middle};
 }
 
 // Nothing of the run depends on the check; on the calibration it does where it is asked for.

@@ -65,7 +65,7 @@ std::vector<PositionedScan> SparseFrontEnd::record(const std::vector<StemScan>& 
   std::vector<PositionedScan> positioned;
   for (const StemScan& result : results) {
     const StampedPose pose{result.view.stamp, result.step.world_from_body};
-    positioned.push_back({waiting_ends_.front(), pose, std::nullopt, false});
+    positioned.push_back({waiting_ends_.front(), pose, std::nullopt, false, std::nullopt});
     check_clock(result, waiting_ends_.front(), rig);
     waiting_ends_.pop_front();
     journal_->on_pose(pose, result.positioned);
