@@ -98,7 +98,7 @@ void OnlineImuCalibration::end_window() {
   const LidarImuResult found = calibrate_lidar_imu(path, imu_, given_, 0.0);
   imu_.forget_before(path.back().stamp - from_seconds(kMarginS));
   if (!found.problem.empty()) return;
-  const Matrix7d information = told_by(found.covariance);
+  const Matrix7d information = told_by(kWindowsAreWorse * found.covariance);
   if (information.isZero(0.0)) return;
   Vector7d step;
   step << so3_log(given_.rotation().conjugate() * found.lidar_from_imu.rotation()),

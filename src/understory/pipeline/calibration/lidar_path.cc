@@ -41,8 +41,8 @@ class MiddlesOfScans {
 };
 
 std::vector<std::string> settings_of(bool with_imu) {
-  return {with_imu ? "refine_imu=true" : "motion.imu_enabled=false",
-          "loop_closure.enabled=false", "map.enabled=false", "georeference.online=false"};
+  return {with_imu ? "refine_imu=true" : "motion.imu_enabled=false", "loop_closure.enabled=false",
+          "map.enabled=false", "georeference.online=false"};
 }
 
 bool imu_was_refused(const Log& log) {
