@@ -26,12 +26,12 @@ struct LidarImuResult {
 };
 
 // Finds how an IMU sits on a lidar, and how late its clock is. It takes a path of the lidar that
-// was found without the IMU, and the IMU's samples. Turns about two axes tell the rotation and the
-// place, and any motion tells the lateness. Batch fit of gyroscope and accelerometer to the path,
-// P2 (3-4), with errors correlated over time. `given` is where the search begins (rotation within
-// 60 degrees, lateness within 0.3 s). It stays where the motion tells nothing: along directions
-// with a standard deviation above 1 degree, 0.1 m or 5 ms. At least 10 s of path with samples, or
-// the result has a problem.
+// was matched without the IMU's word, and the IMU's samples. Turns about two axes tell the rotation
+// and the place, and any motion tells the lateness. Batch fit of gyroscope and accelerometer to the
+// path, P2 (3-4), with errors correlated over time. `given` is where the search begins (rotation
+// within 60 degrees, lateness within 0.3 s). It stays where the motion tells nothing: along
+// directions with a standard deviation above 1 degree, 0.1 m or 5 ms. At least 10 s of path with
+// samples, or the result has a problem.
 [[nodiscard]] LidarImuResult calibrate_lidar_imu(const std::vector<StampedPose>& world_from_lidar,
                                                  const ImuBuffer& imu, const Pose& given,
                                                  double given_late_s);

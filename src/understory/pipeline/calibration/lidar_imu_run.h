@@ -26,10 +26,11 @@ struct LidarImuOutcome : RunOutcome {
   Rig rig;  // with the IMU where it was found
 };
 
-// Finds the path of the lidar by mapping the recording without the IMU, unless a path is given, and
-// calibrates the IMU by it. Writes extrinsics.yaml (for --extrinsics), calibration.json and
-// path.tum (of the lidar). Throws InputError where nothing can be found out, OutputError,
-// ConfigError, and Stopped where the user stops it: nothing is written then.
+// Calibrates the IMU by the path of the lidar. Unless one is given, the recording is mapped for it:
+// without the IMU first, then with scans that the IMU deskews. Writes extrinsics.yaml (for
+// --extrinsics), calibration.json and path.tum (of the lidar). Throws InputError where nothing can
+// be found out, OutputError, ConfigError, and Stopped where the user stops it: nothing is written
+// then.
 [[nodiscard]] LidarImuOutcome run_lidar_imu_calibration(const LidarImuRequest& request, Log& log,
                                                         const ProgressSink& progress);
 
