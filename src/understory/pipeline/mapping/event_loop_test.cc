@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
+#include <functional>
+#include <iterator>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -91,15 +93,18 @@ class MadeUpFrontEnd : public FrontEnd {
 
   std::vector<PositionedScan> handle(const Event& event, const Rig& /*rig*/) override {
     const TimeNs time = event_time(event);
+    std::vector<PositionedScan> positioned;
     if (std::holds_alternative<ScanPtr>(event)) {
       if (script_.throws_at != 0 && time >= script_.throws_at)
         throw std::runtime_error("a made-up failure");
       last_scan_ = time;
       ++scans_;
+      positioned.emplace_back();
+      positioned.back().end = positioned.back().pose.stamp = time;
     }
     course_.handled.push_back(time);
     ++events_;
-    return {};
+    return positioned;
   }
   std::vector<PositionedScan> finish(const Rig& /*rig*/) override {
     ++course_.finished;
@@ -329,6 +334,21 @@ TEST_F(EventLoopTest, ARefinedImuHasTheRecordingBegunAnewThreeTimesAtMost) {
   for (std::size_t i = course_.handled.size() - events_.size(); i < course_.handled.size(); ++i)
     samples += (course_.handled[i] - kStart + from_seconds(0.03)) % kImuStep == 0 ? 1 : 0;
   EXPECT_EQ(samples, 500U);
+}
+
+TEST_F(EventLoopTest, WhoListensHearsEachScanOfEachPass) {
+  script_.imu_refined_at = at(9.0);
+  std::vector<TimeNs> heard;
+  request_.on_positioned = [&](const PositionedScan& scan) { heard.push_back(scan.pose.stamp); };
+  (void)run();
+  const auto passes = std::count(heard.begin(), heard.end(), heard.front());
+  EXPECT_EQ(passes, 4);
+  const auto last = std::find(heard.rbegin(), heard.rend(), heard.front());
+  EXPECT_TRUE(std::is_sorted(heard.rbegin(), last, std::greater<>()));
+  std::size_t scans = 0;
+  for (const Event& event : events_)
+    scans += std::holds_alternative<ScanPtr>(event) ? 1 : 0;
+  EXPECT_EQ(static_cast<std::size_t>(last - heard.rbegin()) + 1, scans);
 }
 
 // The clock that was found goes on after a run was cut off.
