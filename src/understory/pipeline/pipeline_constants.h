@@ -284,6 +284,17 @@ inline constexpr double kRing = 5.0;
 inline constexpr int kRings = 8;
 }  // namespace correction_figures
 
+namespace imu_calibration {  // pipeline/calibration/lidar_imu_run.cc, lidar_clocks_run.cc
+// Times the covariance where the scans were deskewed without the IMU [tuned: handheld by VLP-16,
+// 60 s, seeds 1, 2, 102, 120: squared errors over the variance were 4.3]
+inline constexpr double kScansAloneAreWorse = 4.3;
+// Share of the first path that the second one has at least to count [chosen]
+inline constexpr double kLeastShareAgain = 0.8;
+// s: standard deviation of a clock that is known well enough. A machine that turns with half a
+// radian a second puts a point 20 m away 1 cm off by twice of it [chosen]
+inline constexpr double kSureSdS = 0.001;
+}  // namespace imu_calibration
+
 namespace stand_plots {  // pipeline/inventory/stand_plots.cc
 // Share of a plot that was seen: with more it counts as whole, as cells at its border are uncertain
 // [chosen]

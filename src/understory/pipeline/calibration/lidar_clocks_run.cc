@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "understory/pipeline/calibration/lidar_path.h"
+#include "understory/pipeline/pipeline_constants.h"
 #include "understory/recording/lidars/merged_lidars.h"
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
@@ -17,6 +18,7 @@ namespace understory {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace pipeline_constants::imu_calibration;
 
 constexpr const char* kRigFile = "extrinsics.yaml";
 constexpr const char* kClocksFile = "calibration.json";
@@ -42,7 +44,7 @@ LidarClock find_clock(const LidarClocksRequest& request, const NamedLidar& lidar
   if (!clock.result.problem.empty())
     throw InputError(request.recording, "", lidar.topic + ": " + clock.result.problem);
   clock.late_s = lidar.late_s - clock.result.imu_late_s;
-  clock.sd_s = std::sqrt(std::max(clock.result.covariance(6, 6), 0.0));
+  clock.sd_s = std::sqrt(std::max(kScansAloneAreWorse * clock.result.covariance(6, 6), 0.0));
   return clock;
 }
 
@@ -75,10 +77,6 @@ std::string clocks_json(const LidarClocksOutcome& outcome) {
                               {"duration_s", clock.result.duration_s}});
   return json.dump(2) + "\n";
 }
-
-// s: standard deviation of a clock that is known well enough. A machine that turns with half a
-// radian a second puts a point 20 m away 1 cm off by twice of it [chosen]
-constexpr double kSureSdS = 0.001;
 
 // Places that the motion does not tell are of no concern: they stay as they are given.
 void judge_clock(const LidarClock& clock, const std::vector<std::string>& doubts,

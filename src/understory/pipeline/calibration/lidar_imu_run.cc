@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "understory/pipeline/calibration/lidar_path.h"
+#include "understory/pipeline/pipeline_constants.h"
 #include "understory/recording/lidars/merged_lidars.h"
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
@@ -20,17 +21,12 @@ namespace understory {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace pipeline_constants::imu_calibration;
 
 constexpr const char* kExtrinsicsFile = "extrinsics.yaml";
 constexpr const char* kLidarImuFile = "calibration.json";
 constexpr const char* kLidarPathFile = "path.tum";
 constexpr double kDegreesARad = 180.0 / std::numbers::pi;
-// Times the covariance where the scans were deskewed without the IMU [tuned: handheld by VLP-16,
-// 60 s, seeds 1, 2, 102, 120: squared errors over the variance were 4.3]
-constexpr double kScansAloneAreWorse = 4.3;
-// Share of the first path that the second one has at least to count [chosen]
-constexpr double kLeastShareAgain = 0.8;
-
 bool is_lidar_imu_file(const std::string& name) {
   return name == kExtrinsicsFile || name == kLidarImuFile || name == kLidarPathFile;
 }
