@@ -79,7 +79,8 @@ struct MatchEvidence {
   double range_offset_m = 0.0;
   double range_offset_error_m = 0.0;
   int range_pairs = 0;
-  double smear_m = 0.0;  // how far a point 10 m away moves during a scan, on average
+  double smear_m = 0.0;             // how far a point 10 m away moves during a scan, on average
+  std::uint64_t by_satellites = 0;  // scans whose match or place fixes told something of
 };
 
 // The one of several lidars whose points lie farthest off those of the first one, see LidarOffset.

@@ -39,11 +39,13 @@ class Judge {
     judge_scan_motion();
     judge_further_lidar();
     judge_imu();
-    judge_scale();
     judge_ranges();
+    const std::size_t before = hurt_.size();
+    judge_scale();
     judge_motion();
     judge_matches();
     judge_course();
+    if (hurt_.size() > before) suspect_fixes();
     judge_outages();
     judge_stems();
     judge_stand();
@@ -437,6 +439,15 @@ class Judge {
     // Around a path lie areas that were seen from afar alone, so few points in the mean are no harm
     // by themselves.
     if (stand.few_near_breast && stand.trees == 0) missing(few_points_reason(false));
+  }
+
+  // Something is wrong with the path. Where fixes pull at it, they may be what bent it.
+  void suspect_fixes() {
+    if (evidence_.match.by_satellites == 0) return;
+    hurt(fmt::format(
+        "positions by satellites moved the matches of {} of {} scans. A receiver that drifts and "
+        "states centimetres bends the map. Map again with gnss.match.use=none and compare",
+        evidence_.match.by_satellites, evidence_.match.scans));
   }
 
   RunJudgement judgement() {

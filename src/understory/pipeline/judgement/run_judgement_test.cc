@@ -68,6 +68,19 @@ TEST(RunJudgement, AGoodRunIsComplete) {
   expect_complete(mended);
 }
 
+TEST(RunJudgement, FixesThatPullAreNamedWhereThePathIsWrong) {
+  RunEvidence evidence = good_run();
+  evidence.match.by_satellites = 300;
+  expect_complete(evidence);
+  evidence.match.unmatched = evidence.match.scans / 4;
+  const RunJudgement judgement = judged(evidence);
+  EXPECT_EQ(judgement.status, RunStatus::kUntrusted);
+  ASSERT_EQ(judgement.reasons.size(), 2U);
+  EXPECT_NE(judgement.reasons.back().find("gnss.match.use=none"), std::string::npos);
+  evidence.match.by_satellites = 0;
+  EXPECT_EQ(judged(evidence).reasons.size(), 1U);
+}
+
 TEST(RunJudgement, ScansWithoutASay) {
   const auto with = [](std::uint64_t dropped, std::uint64_t late, std::uint64_t unreadable,
                        std::uint64_t glitches) {

@@ -54,6 +54,7 @@ void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const R
   match.unmatched = counts.unmatched + counts.gated;
   match.empty = counts.empty_scans;
   match.repeated = counts.repeated;
+  match.by_satellites = counts.by_satellites;
   const MapPieces pieces = front_end.map().finished_pieces();
   match.segments = pieces.groups() + (counts.segments - pieces.count());
   match.joined = counts.segments - match.segments;
