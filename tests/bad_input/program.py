@@ -11,7 +11,7 @@ import shutil
 import subprocess
 import tempfile
 
-from recordings import read_mcap
+from recordings import Message, read_mcap, write_mcap
 
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 SITE = ("lidar.model=VLP-16", "carrier.still_s=1",
@@ -124,6 +124,19 @@ def good_recording(seconds=12, seed=5, more=()):
     recording = simulated("demo", seed, seconds, *SITE, *more)
     path = unpacked(recording)
     return path, read_mcap(path), recording.with_suffix(".truth")
+
+
+def rewritten(path, recording, change):
+    """The recording with what `change` makes of each message; without those of which it makes nothing. All topics stay,
+    where `unpacked` has one lidar. Needs mcap."""
+    from mcap.reader import make_reader
+
+    with open(recording, "rb") as file:
+        messages = [Message(channel.topic, schema.name, message.log_time, message.data)
+                    for schema, channel, message in make_reader(file).iter_messages()]
+    made = [new for message in messages if (new := change(message))]
+    write_mcap(path, sorted(made, key=lambda message: message.time))
+    return path
 
 
 def error_m(outcome, truth):

@@ -3,9 +3,8 @@
 import array
 import json
 
-from mcap.reader import make_reader
-from program import Cases, map_recording, program
-from recordings import Message, edit_cloud, write_mcap
+from program import Cases, map_recording, program, rewritten, simulated
+from recordings import edit_cloud
 
 cases = Cases()
 SMALL = ["stand.size_x_m=60", "stand.size_y_m=60", "gnss.enabled=false", "carrier.length_m=30", "carrier.turn_interval_s=3"]
@@ -13,29 +12,8 @@ SECONDS = 12
 BOTH = ("--lidar-topic", "/lidar,/lidar_2")
 
 
-def simulated(name, *settings, seconds=SECONDS):
-    path = cases.folder / name
-    words = [word for setting in [*SMALL, *settings] for word in ("--set", setting)]
-    done = program("simulate", "harvester2", "-o", path, "--seed", 5, "--duration-s", seconds, *words)
-    assert done.returncode == 0, done.stderr
-    return path
-
-
-WALK = simulated("walk.mcap")
+WALK = simulated("harvester2", 5, SECONDS, *SMALL)
 START = 1_700_000_000 * 10**9  # of every simulation
-
-
-def messages_of(recording):
-    with open(recording, "rb") as file:
-        return [Message(channel.topic, schema.name, message.log_time, message.data)
-                for schema, channel, message in make_reader(file).iter_messages()]
-
-
-def rewritten(path, recording, change):
-    """The recording with what `change` makes of each message; without those of which it makes nothing."""
-    made = [new for message in messages_of(recording) if (new := change(message))]
-    write_mcap(path, sorted(made, key=lambda m: m.time))
-    return path
 
 
 def behind(offsets_s):
@@ -114,8 +92,8 @@ def begins_late(folder):
 def differing_clocks(folder):
     assert not {"lidars.clock", "lidars.place"} & set(map_recording(WALK, folder / "right", *BOTH).warnings)
     said = []
-    longer = simulated("longer.mcap", "stand.size_x_m=100", "stand.size_y_m=100", "carrier.length_m=60",
-                       "carrier.turn_interval_s=10", seconds=25)
+    longer = simulated("harvester2", 5, 25, *SMALL, "stand.size_x_m=100", "stand.size_y_m=100", "carrier.length_m=60",
+                       "carrier.turn_interval_s=10")
     for late_s, status in ((0.02, "complete"), (0.1, "untrusted")):
         recording = rewritten(folder / f"late{late_s}.mcap", longer, behind({"/lidar_2": late_s}))
         outcome = map_recording(recording, folder / f"run{late_s}", *BOTH)

@@ -27,6 +27,7 @@ constexpr const char* kExtrinsicsFile = "extrinsics.yaml";
 constexpr const char* kLidarImuFile = "calibration.json";
 constexpr const char* kLidarPathFile = "path.tum";
 constexpr double kDegreesARad = 180.0 / std::numbers::pi;
+
 bool is_lidar_imu_file(const std::string& name) {
   return name == kExtrinsicsFile || name == kLidarImuFile || name == kLidarPathFile;
 }
@@ -99,20 +100,35 @@ void write_path(const fs::path& path, const std::vector<StampedPose>& world_from
   file.commit();
 }
 
-void judge(LidarImuOutcome& outcome, const std::vector<std::string>& doubts) {
-  outcome.reasons = outcome.result.kept;
-  if (!outcome.reasons.empty()) outcome.status = RunStatus::kPartial;
-  if (doubts.empty()) return;
-  outcome.status = RunStatus::kUntrusted;
-  for (const std::string& doubt : doubts)
-    outcome.reasons.push_back("the path of the lidar: " + doubt);
-}
-
 // What a recording tells, and the path that tells it.
 struct MappedCalibration {
   LidarPath path;
   LidarImuResult result;
+  std::string alone_because;  // why the path with the IMU does not count; empty: it does
 };
+
+void judge(LidarImuOutcome& outcome, const MappedCalibration& found) {
+  outcome.reasons = outcome.result.kept;
+  if (!found.alone_because.empty())
+    outcome.reasons.push_back(
+        "the values rest on the path of the lidar alone and are less exact: " +
+        found.alone_because);
+  if (!outcome.reasons.empty()) outcome.status = RunStatus::kPartial;
+  if (found.path.doubts.empty()) return;
+  outcome.status = RunStatus::kUntrusted;
+  for (const std::string& doubt : found.path.doubts)
+    outcome.reasons.push_back("the path of the lidar: " + doubt);
+}
+
+// Why a path that was mapped with the IMU does not count beside that of the lidar alone.
+std::string doubt_of(const MappedCalibration& with_imu, const MappedCalibration& alone) {
+  if (!with_imu.path.doubts.empty())
+    return "mapped with this IMU the recording is not to be trusted (" +
+           with_imu.path.doubts.front() + ")";
+  if (!with_imu.result.problem.empty()) return with_imu.result.problem;
+  if (with_imu.result.duration_s > kLeastShareAgain * alone.result.duration_s) return "";
+  return "mapped with this IMU fewer scans match";
+}
 
 // By the path of the lidar alone first. Its scans are deskewed by a guess, and what a steady guess
 // gets wrong swings with the motion. So the recording is mapped once more, deskewed by the IMU as
@@ -132,9 +148,8 @@ MappedCalibration calibrate_by_mapping(const LidarImuRequest& request, const fs:
       mapped_lidar_path(request.recording, request.open, folder, read.rig, progress, found);
   again.result = calibrate_lidar_imu(again.path.world_from_lidar, read.samples,
                                      alone.result.lidar_from_imu, alone.result.imu_late_s);
-  const bool usable = again.path.doubts.empty() && again.result.problem.empty() &&
-                      again.result.duration_s > kLeastShareAgain * alone.result.duration_s;
-  return usable ? again : alone;
+  alone.alone_because = doubt_of(again, alone);
+  return alone.alone_because.empty() ? again : alone;
 }
 
 MappedCalibration calibrate_by_file(const std::string& file, const InertialRecording& read,
@@ -168,7 +183,7 @@ LidarImuOutcome run_lidar_imu_calibration(const LidarImuRequest& request, Log& l
     throw InputError(request.recording, "",
                      "expected motion: the recording is too calm to tell rotation, place or "
                      "lateness of the IMU; walk, turn quickly and tilt the sensor");
-  judge(outcome, found.path.doubts);
+  judge(outcome, found);
   outcome.rig = given;
   outcome.rig.body_from_imu = given.body_from_lidar * outcome.result.lidar_from_imu;
   outcome.summary = summary_of(outcome, given, request.folder);
