@@ -9,7 +9,7 @@ import re
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent / "bad_input"))
-from program import Cases, program, simulated
+from program import Cases, placed_recording, program, simulated
 
 THREADS = (1, 4)
 # Keys of run.json that tell of the machine's work, not of the result.
@@ -83,10 +83,7 @@ WALK = simulated("handheld", 5, 9)
 TWO_LIDARS = simulated("harvester2", 5, 4)
 prepared("map", RIDE, "-o", "dense")
 prepared("map", RIDE, "-o", "stems", "--front-end", "sparse")
-PLACED = simulated("demo", 4, 16, "lidar.model=VLP-16", "gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02", "gnss.white_sd_m=0.02",
-                   "gnss.jump_interval_s=0", "gnss.burst_interval_s=0", "stand.size_x_m=40", "stand.size_y_m=40",
-                   "stand.trees_per_ha=400")  # that of layers_on_globe.py
-prepared("map", PLACED, "-o", "ride")
+prepared("map", placed_recording(), "-o", "ride")
 prepared("georeference", "ride", "-o", "globe", "--method", "gnss-path")
 prepared("convert", RIDE, "clouds", "--format", "ply")
 clouds = [f"../../clouds/{i:06}.ply" for i in (0, 4)]

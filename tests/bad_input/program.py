@@ -16,6 +16,10 @@ from recordings import Message, read_mcap, write_mcap
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 SITE = ("lidar.model=VLP-16", "carrier.still_s=1",
         "carrier.turn_interval_s=4", "gnss.enabled=false")
+# Fixes that are good everywhere, and a stand of few trees, for tests of something else than trees.
+GOOD_SKY = ("gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02", "gnss.white_sd_m=0.02", "gnss.jump_interval_s=0",
+            "gnss.burst_interval_s=0")
+SMALL_STAND = ("stand.size_x_m=40", "stand.size_y_m=40", "stand.trees_per_ha=400")
 
 
 class Outcome:
@@ -124,6 +128,11 @@ def good_recording(seconds=12, seed=5, more=()):
     recording = simulated("demo", seed, seconds, *SITE, *more)
     path = unpacked(recording)
     return path, read_mcap(path), recording.with_suffix(".truth")
+
+
+def placed_recording(seed=4, seconds=16):
+    """A short walk in a small stand, with good fixes; shared by all tests."""
+    return simulated("demo", seed, seconds, "lidar.model=VLP-16", *GOOD_SKY, *SMALL_STAND)
 
 
 def rewritten(path, recording, change):

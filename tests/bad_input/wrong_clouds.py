@@ -9,12 +9,11 @@ import random
 import laspy
 import numpy as np
 
-from program import Cases, program, simulated
+from program import Cases, placed_recording, program
 
 cases = Cases()
 SIDE = 20.0
-WALK = simulated("demo", 6, 12, "lidar.model=VLP-16", "gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02",
-                 "gnss.white_sd_m=0.02", "stand.size_x_m=40", "stand.size_y_m=40", "stand.trees_per_ha=400")  # that of world_frame.py
+WALK = placed_recording(6, 12)
 
 
 def places(seed, count=24):

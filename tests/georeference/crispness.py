@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program, simulated
+from program import SMALL_STAND, Cases, program, simulated
 
 import laspy
 import numpy
@@ -17,7 +17,7 @@ cases = Cases()
 MOST_NATS = 0.02
 MOST_APE = (1.05, 0.001)  # times that without positions, and metres more
 SITE = ("lidar.model=VLP-16", "gnss.jump_interval_s=10", "gnss.jump_m=10", "gnss.burst_interval_s=15", "gnss.burst_m=10",
-        "stand.size_x_m=40", "stand.size_y_m=40", "stand.trees_per_ha=400")
+        *SMALL_STAND)
 
 
 def answer(*words):

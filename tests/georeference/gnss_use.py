@@ -7,11 +7,9 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program, simulated
+from program import GOOD_SKY, Cases, program, simulated
 
 cases = Cases()
-GOOD_SKY = ("gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02", "gnss.white_sd_m=0.02", "gnss.jump_interval_s=0",
-            "gnss.burst_interval_s=0")
 BAD_SKY = ("gnss.jump_interval_s=10", "gnss.burst_interval_s=15", "gnss.mount_m=[0.3,-0.2,1.1]")
 
 

@@ -16,12 +16,10 @@ import laspy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program, simulated
+from program import Cases, placed_recording, program
 
 cases = Cases()
 A, F = 6378137.0, 1 / 298.257223563
-GOOD_SKY = ("gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02", "gnss.white_sd_m=0.02", "gnss.jump_interval_s=0",
-            "gnss.burst_interval_s=0")
 
 
 def geodetic(points, origin, pose):
@@ -100,7 +98,7 @@ def tool(name, *words):
     return done.stdout
 
 
-RECORDING = simulated("demo", 4, 16, "lidar.model=VLP-16", *GOOD_SKY, "stand.size_x_m=40", "stand.size_y_m=40", "stand.trees_per_ha=400")
+RECORDING = placed_recording()
 RUN, LOCAL = cases.folder / "run", cases.folder / "local"
 FIRST = program("map", RECORDING, "-o", RUN)
 SECOND = program("map", RECORDING, "-o", LOCAL, "--set", "georeference.enabled=false")

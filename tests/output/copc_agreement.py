@@ -19,7 +19,7 @@ import numpy as np
 from laspy.copc import Bounds
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import simulated
+from program import placed_recording, simulated
 
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 COLUMNS = ("X", "Y", "Z", "gps_time", "intensity", "classification")
@@ -147,9 +147,7 @@ def check_refusals(folder, walk):
 
 with tempfile.TemporaryDirectory() as room:
     folder = Path(room)
-    walk = simulated("demo", 4, 16, "lidar.model=VLP-16", "gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02", "gnss.white_sd_m=0.02",
-                     "gnss.jump_interval_s=0", "gnss.burst_interval_s=0", "stand.size_x_m=40", "stand.size_y_m=40",
-                     "stand.trees_per_ha=400")  # that of layers_on_globe.py
+    walk = placed_recording()
     run("map", walk, "-o", folder / "run", "--copc")
     print("map:", check(folder / "run", trees=False))
     facts = json.loads((folder / "run/run.json").read_text())

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program, simulated
+from program import Cases, placed_recording, program
 
 cases = Cases()
 PATHS = ("trajectory.tum", "trajectory_imu.tum", "trajectory_partial.tum", "keyframes.tum", "odometry.tum")
@@ -131,8 +131,7 @@ def both(*arguments, codes=(0,), **runs):
     return said
 
 
-RECORDING = simulated("demo", 6, 12, "lidar.model=VLP-16", "gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02",
-                      "gnss.white_sd_m=0.02", "stand.size_x_m=40", "stand.size_y_m=40", "stand.trees_per_ha=400")
+RECORDING = placed_recording(6, 12)
 TRUTH = RECORDING.with_suffix(".truth")
 DENSE_RUNS = mapped("dense", RECORDING, "--imu-rate", "--set", "scan_fraction=0.5", "--inventory", "full", "--plot-grid", 10)
 STEM_RUNS = mapped("stems", RECORDING, "--front-end", "sparse", "--set", "harvester.fells=true")

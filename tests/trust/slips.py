@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import PROGRAM, Cases, good_recording, map_recording, program
+from program import PROGRAM, SMALL_STAND, Cases, good_recording, map_recording, program
 from recordings import edit_imu, write_mcap
 
 cases = Cases()
@@ -115,7 +115,7 @@ def other_way(folder):
         assert done.returncode == 3 and f"understory map {recording}" in done.stderr, done
 
 
-GOOD, MESSAGES, TRUTH = good_recording(seconds=6, more=("stand.size_x_m=40", "stand.size_y_m=40", "stand.trees_per_ha=400"))
+GOOD, MESSAGES, TRUTH = good_recording(seconds=6, more=SMALL_STAND)
 
 
 @cases.case("sensors that the extrinsics put tens of metres apart")
