@@ -74,6 +74,22 @@ TEST(Ground, GhostsBelowEveryCellDoNotPullItDown) {
   EXPECT_LT(worst, 0.4);  // a ghost just below its cell may stay
 }
 
+// Cells of the border have no neighbours beyond it. One row of the raster follows the other in
+// memory, and the other end of a row lies 12 m higher or lower.
+TEST(Ground, AGapAtTheBorderOfTheRasterIsFilledFromItsOwnSide) {
+  for (const double low : {0.0, 18.0}) {
+    TestPlot plot(7);
+    plot.slope_x = 0.6;
+    plot.add_ground(20.0, 40);
+    std::erase_if(plot.cloud, [&](const Eigen::Vector3d& point) {
+      return point.x() >= low && point.x() < low + 2.0 && std::abs(point.y() - 10.0) < 2.0;
+    });
+    const GroundModel model = estimate_ground(blocks_of(plot.cloud), {});
+    for (double x = low + 0.3; x < low + 1.8; x += 0.3)
+      EXPECT_NEAR(model.terrain.interpolate(x, 10.0), plot.ground(x, 10.0), 1.2) << x;
+  }
+}
+
 TEST(Ground, NothingIsInventedFarFromTheGround) {
   TestPlot plot(3);
   plot.add_ground(10.0, 40);

@@ -65,6 +65,30 @@ TEST(DensityPeaks, AreTheSameAcrossTheBorderOfABlock) {
   }
 }
 
+// Blocks one after the other use the same memory. The second cluster has the place of the first one
+// in its own block, but for three centimetres, and is weaker.
+TEST(DensityPeaks, OfABlockKnowNothingOfTheBlocksBefore) {
+  constexpr double kBlockM = 8.0;
+  Random random(9);
+  Points strong;
+  add_cluster(random, 4.0, 4.0, 0.02, 90, strong);
+  Points weak;
+  add_cluster(random, 4.03 + 2.0 * kBlockM, 4.0, 0.02, 30, weak);
+  std::vector<DensityPeak> apart = find_density_peaks(strong, {});
+  const std::vector<DensityPeak> second = find_density_peaks(weak, {});
+  ASSERT_FALSE(apart.empty());
+  ASSERT_FALSE(second.empty());
+  apart.insert(apart.end(), second.begin(), second.end());
+  Points both = strong;
+  both.insert(both.end(), weak.begin(), weak.end());
+  const std::vector<DensityPeak> together = find_density_peaks(both, {});
+  ASSERT_EQ(together.size(), apart.size());
+  for (std::size_t i = 0; i < apart.size(); ++i) {
+    EXPECT_EQ(together[i].place, apart[i].place);
+    EXPECT_EQ(together[i].contrast, apart[i].contrast);
+  }
+}
+
 TEST(DensityPeaks, DependOnNeitherOrderNorThreads) {
   Random random(7);
   Points points;
