@@ -147,6 +147,22 @@ def edit_imu(message, change):
     return dataclasses.replace(message, data=bytes(data))
 
 
+def edit_fix(message, change):
+    """The NavSatFix with (latitude, longitude, height, variances) = change of these: degrees, metres, nine m^2."""
+    cdr = Cdr(message.data)
+    cdr.take("I", 2)
+    cdr.text()
+    cdr.take("b")
+    cdr.take("H")
+    places_at, places = cdr.take("d", 3)
+    variances_at, variances = cdr.take("d", 9)
+    *places, variances = change(*places, variances)
+    data = bytearray(message.data)
+    struct.pack_into("<3d", data, places_at, *places)
+    struct.pack_into("<9d", data, variances_at, *variances)
+    return dataclasses.replace(message, data=bytes(data))
+
+
 def _records(data, start, end):
     while start + 9 <= end:
         length = struct.unpack_from("<Q", data, start + 1)[0]

@@ -35,11 +35,19 @@ inline constexpr double kFarFixMedians = 8.0;
 inline constexpr double kFarOriginDeg = 0.2;
 }  // namespace satellite_pairs
 
-namespace satellite_belief {  // georeference/satellites/satellite_belief.cc
+namespace satellite_belief {  // georeference/satellites/in_match/satellite_belief.cc
 // m: steps of the path that show which way the carrier goes [chosen]
 inline constexpr double kCourseStepM = 1.0;
 // m/s below which a course of `course_way_m` tells no heading [chosen: slow walking]
 inline constexpr double kSlowestCourseMS = 0.4;
+// Scans from one that is matched by its points alone to the next [chosen: a fifth of the time of
+// matches]
+inline constexpr int kProbeEvery = 5;
+// Degrees between the way and where the carrier looks, beyond which that tells no heading of the
+// map [chosen: a sleigh slips by less]
+inline constexpr double kMostSlipDeg = 20.0;
+// and by which it turns on that way [chosen: a bend whose radius is three times course_way_m]
+inline constexpr double kMostBendDeg = 20.0;
 // m from the body's origin beyond which a centre of turning is none [bound: a lidar's range]
 inline constexpr double kFarthestCentreM = 50.0;
 // Fixes kept for the course, at most [bound: memory]
@@ -74,6 +82,27 @@ inline constexpr double kUnknownM = 1e3;
 // and of an angle, rad [chosen: as good as nothing]
 inline constexpr double kUnknownRad = 10.0;
 }  // namespace satellite_belief
+
+namespace fix_drift {  // georeference/satellites/in_match/fix_drift.cc
+// Standard deviations from the path beyond which a fix has left it [chosen]
+inline constexpr double kLeavingSteps = 4.0;
+// Error of the odometry, m [chosen: ten times that of a good one]
+inline constexpr double kOdometryM = 0.03;
+// and as a share of the way [chosen: ten times that of whole skidoo, seed 3, in the plane]
+inline constexpr double kOdometryShare = 0.003;
+// The same for a fix that has left the path: so far it must come back [chosen: a third]
+inline constexpr double kReturnShare = 0.001;
+// and of a way whose scans were held in some directions only, added [chosen]
+inline constexpr double kLooseShare = 0.1;
+// m: over such a way the local map follows pulled scans [chosen: what a lidar sees under trees]
+inline constexpr double kMapWayM = 30.0;
+// m between the fixes that later ones are compared with [chosen]
+inline constexpr double kAnchorStepM = 5.0;
+// and how many they are [chosen: a hundred metres]
+inline constexpr std::size_t kMostAnchors = 20;
+// The last few of them are compared by themselves, too [chosen: 25 m]
+inline constexpr std::size_t kFewAnchors = 5;
+}  // namespace fix_drift
 
 namespace second_antenna {  // georeference/satellites/second_antenna.cc
 // Pairs with a heading at least [bound: a median that leaves one out]

@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 
 #include "understory/util/error.h"
 
@@ -14,10 +15,16 @@ PenaltyPoint point_at(const PoseBelief& belief, const Eigen::Vector3d& arm) {
   point.position_in_target = belief.target_from_source * belief.point_in_source + arm;
   point.point_in_source =
       belief.point_in_source + belief.target_from_source.rotation().conjugate() * arm;
-  // A small turn w of the target's axes moves it by w x arm.
+  // A small turn w of the target's axes moves it by w x arm. A larger one also brings it nearer, by
+  // half its square. A heading that is some degrees off would push the scan along its arm else.
   const Eigen::Matrix3d lever = skew(arm);
-  point.covariance =
-      belief.position_covariance + lever * belief.attitude_covariance * lever.transpose();
+  const Eigen::Matrix3d aside = lever * belief.attitude_covariance * lever.transpose();
+  point.covariance = belief.position_covariance + aside;
+  const double length = arm.norm();
+  if (length > 0.0) {
+    const double nearer = 0.5 * aside.trace() / length;
+    point.covariance += std::pow(nearer / length, 2.0) * arm * arm.transpose();
+  }
   return point;
 }
 

@@ -75,7 +75,8 @@ TEST(Penalties, ThreePointsLieAtTheAntennaBelowItAndAhead) {
   // The point below moves with roll and pitch, and the one ahead up and down with pitch.
   EXPECT_NEAR(points[1].covariance(0, 0), 0.04 + 4.0 * 2e-4, 1e-12);
   EXPECT_NEAR(points[1].covariance(1, 1), 0.09 + 4.0 * 1e-4, 1e-12);
-  EXPECT_NEAR(points[1].covariance(2, 2), 0.25, 1e-12);
+  // A turn by an angle brings it nearer by half the square of that.
+  EXPECT_NEAR(points[1].covariance(2, 2), 0.25 + std::pow(0.5 * 2.0 * (1e-4 + 2e-4), 2), 1e-12);
 }
 
 // Alone, the direct form has its minimum at the belief. Its curvature is that of both covariances:

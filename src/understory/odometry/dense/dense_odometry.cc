@@ -105,6 +105,7 @@ DenseEstimate DenseOdometry::process(const Scan& scan, const MatchTargetPtr& loc
         motion_until(guess, scan.stamp + (estimate.scan_end - scan.stamp) / 2);
     const bool by_match = local_map && !known.pose;
     if (by_match) match(*local_map, motion_->predict(scan.stamp), known.terms, estimate);
+    if (known.also_alone && estimate.matched) match_alone(*local_map, estimate);
     watch_scan_motion(scan, local_map, guess, estimate);
     watch_lidars(scan, local_map, estimate);
     if (config_.elastic_scans && estimate.matched && by_scans_alone())
@@ -269,6 +270,15 @@ void DenseOdometry::watch_lidars(const Scan& scan, const MatchTargetPtr& local_m
     poses.push_back(found ? std::optional(match.target_from_source) : std::nullopt);
   }
   agreement_.add(poses);
+}
+
+void DenseOdometry::match_alone(const MatchTarget& local_map, DenseEstimate& estimate) {
+  const ScopedTimer timer(times_, "matching_alone");
+  const RegistrationResult match = match_cloud(
+      local_map, estimate.thinned, estimate.match.target_from_source, {}, MatchStart::kNear);
+  const bool held = match.usable() && match.degenerate_directions.cols() == 0;
+  if (held && match.inlier_ratio >= config_.match.min_inlier_ratio)
+    estimate.alone = match.target_from_source;
 }
 
 void DenseOdometry::match_elastically(const Scan& scan, const MatchTarget& target,

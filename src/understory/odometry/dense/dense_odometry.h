@@ -76,10 +76,11 @@ void describe(ConfigTable& table, DenseOdometryConfig& config);
 struct DenseEstimate {
   NavState state;  // at the scan's stamp
   MotionUpdate update;
-  RegistrationResult match;  // status kTooFewPoints where there was no map to match to
-  bool matched = false;      // the match was usable and was offered to the motion model
-  double found_share = 1.0;  // its inlier ratio over the usual one, if it was usable
-  BodyCloud cloud;           // every return outside the machine, deskewed, body frame at the stamp
+  RegistrationResult match;   // status kTooFewPoints where there was no map to match to
+  bool matched = false;       // the match was usable and was offered to the motion model
+  std::optional<Pose> alone;  // by a second match without terms (ScanKnowledge::also_alone)
+  double found_share = 1.0;   // its inlier ratio over the usual one, if it was usable
+  BodyCloud cloud;            // every return outside the machine, deskewed, body frame at the stamp
   std::optional<BodyCloud> tops;  // of the cloud, where tree tops alone count
   BodyCloud thinned;              // what was matched, of the tops or of the cloud
   std::size_t weather = 0;        // returns that the weather filter dropped
@@ -102,6 +103,7 @@ struct PartEstimate {
 struct ScanKnowledge {
   PoseTerms terms;                  // count in its match
   std::optional<LidarFactor> pose;  // stands instead of a match
+  bool also_alone = false;          // it is matched a second time, without the terms
 };
 
 // Dense lidar-inertial odometry, P4 F2 (left graph) and P2 section 2: predict, deskew, thin, match
@@ -165,6 +167,8 @@ class DenseOdometry {
   // Matches the points of each lidar by themselves, now and then.
   void watch_lidars(const Scan& scan, const MatchTargetPtr& local_map,
                     const DenseEstimate& estimate);
+  // Where a matched scan would lie without terms.
+  void match_alone(const MatchTarget& local_map, DenseEstimate& estimate);
   // Learns which of the scan's points are carried along.
   void learn_carried(const Scan& scan, const std::vector<StampedPose>& path);
   // A lidar that joins sees what is not in the map yet: what was found before says nothing then.

@@ -11,7 +11,7 @@ namespace understory {
 // The layout of what a run keeps: checkpoint, journal, views. It grows by one with each change of
 // any of them, and a run of another layout is not gone on with. checkpoint_format_test.cc notices a
 // change.
-inline constexpr int kCheckpointFormat = 18;
+inline constexpr int kCheckpointFormat = 19;
 
 // A checkpoint that was found whole.
 struct Checkpoint {

@@ -340,10 +340,7 @@ void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record
     if (satellites_) satellites_->level_world(*estimate.update.new_world_from_old_world);
   }
   positioned_.pose = {record.stamp, state.world_from_body};
-  if (satellites_) {
-    satellites_->add_pose(positioned_.pose);
-    if (estimate.match.usable()) satellites_->note_match(estimate.match.information);
-  }
+  if (satellites_) tell_satellites(estimate);
   positioned_.new_world_from_old_world = estimate.update.new_world_from_old_world;
   const bool good =
       record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;

@@ -10,7 +10,7 @@
 
 #include "understory/calibration/lidar_imu/clock_check.h"
 #include "understory/calibration/lidar_imu/online_calibration.h"
-#include "understory/georeference/satellites/satellite_belief.h"
+#include "understory/georeference/satellites/in_match/satellite_belief.h"
 #include "understory/map/keyframes/keyframe_map.h"
 #include "understory/odometry/dense/dense_odometry.h"
 #include "understory/odometry/dense/recovery.h"
@@ -160,6 +160,8 @@ class DenseFrontEnd : public FrontEnd {
   void make_odometry(const Rig& rig);
   void tell_of_imu(TimeNs now);
   void make_satellites();
+  // How a scan was positioned.
+  void tell_satellites(const DenseEstimate& estimate);
   void take_fix(const GnssFix& fix);
   [[nodiscard]] ScanKnowledge knowledge_of(const Scan& scan);
   void complete_rig(const Rig& rig);

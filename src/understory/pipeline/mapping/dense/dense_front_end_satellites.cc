@@ -1,4 +1,6 @@
 // What positions by satellites say of the scans while they are positioned (P3).
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "understory/geometry/matrix_inverse.h"
@@ -45,7 +47,10 @@ ScanKnowledge DenseFrontEnd::knowledge_of(const Scan& scan) {
   const StampedPose there{scan.stamp, predicted};
   const std::optional<PoseBelief> belief = satellites_->at(there, motion.level_from_world());
   const std::optional<PoseBelief> heading = satellites_->heading_at(there);
-  if (!belief && !heading) return {};
+  if (!belief && !heading) {
+    satellites_->note_probe(predicted, predicted);  // nothing pulls
+    return {};
+  }
   const SatelliteBeliefConfig& config = config_.satellites;
   const bool prior = config.use == SatellitesInMatch::kPrior;
   if (prior && !odometry_->uses_imu()) {
@@ -56,10 +61,25 @@ ScanKnowledge DenseFrontEnd::knowledge_of(const Scan& scan) {
   ++received_.counts.by_satellites;
   if (prior) return {{}, factor_of(*belief)};
   ScanKnowledge known;
+  known.also_alone = satellites_->wants_probe();
   for (const std::optional<PoseBelief>& one : {belief, heading}) {
     if (one) known.terms.push_back(penalty_term(*one, config.form, config.arm_m, config.scale));
   }
   return known;
+}
+
+void DenseFrontEnd::tell_satellites(const DenseEstimate& estimate) {
+  const RegistrationResult& match = estimate.match;
+  const bool had_left = satellites_->drift().left();
+  if (estimate.alone) satellites_->note_probe(*estimate.alone, match.target_from_source);
+  satellites_->add_pose(positioned_.pose,
+                        !estimate.matched || match.degenerate_directions.cols() > 0);
+  if (match.usable()) satellites_->note_match(match.information);
+  if (had_left || !satellites_->drift().left()) return;
+  log_.warn("gnss.drift",
+            fmt::format("positions by satellites leave the path of the scans at {}, by more than "
+                        "they say; they do not pull until they come back",
+                        format_seconds(positioned_.pose.stamp)));
 }
 
 std::vector<PositionedScan> DenseFrontEnd::finish(const Rig& /*rig*/) {

@@ -6,7 +6,7 @@
 
 #include "understory/forest/inventory.h"
 #include "understory/forest/obstacles.h"
-#include "understory/georeference/satellites/satellite_belief.h"
+#include "understory/georeference/satellites/in_match/satellite_belief.h"
 #include "understory/map/carrier_region.h"
 #include "understory/map/clouds/map_tiles.h"
 #include "understory/map/keyframes/keyframe_map.h"

@@ -233,6 +233,7 @@ void fill_quality(const DenseFrontEnd& front_end, const TrajectoryFacts& traject
   if (satellites != nullptr && satellites->aligned_at() != 0) {
     summary.quality["gnss_match_from_s"] =
         to_seconds(satellites->aligned_at() - front_end.first_scan());
+    summary.quality["gnss_match_off_m"] = satellites->drift().farthest_m();
   }
   summary.quality["imu_without_place_s"] = to_seconds(front_end.imu_usage().without_place());
   summary.quality["loop_search_cpu_s"] = front_end.map().search_cpu_seconds();

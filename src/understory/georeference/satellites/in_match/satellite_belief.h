@@ -8,6 +8,7 @@
 
 #include "understory/geometry/stamped_pose.h"
 #include "understory/georeference/satellites/fix_covariance.h"
+#include "understory/georeference/satellites/in_match/fix_drift.h"
 #include "understory/georeference/satellites/online_georeference.h"
 #include "understory/georeference/systems/geodetic.h"
 #include "understory/registration/penalties.h"
@@ -74,14 +75,21 @@ class SatelliteBelief {
   // `antenna_in_body`, `second_in_body`: metres, see OnlineGeoreference.
   void add_fix(const GnssFix& fix, const Eigen::Vector3d& antenna_in_body,
                const std::optional<Eigen::Vector3d>& second_in_body = {});
-  // The next scan, as it was positioned.
-  void add_pose(const StampedPose& pose);
+  // The next scan, as it was positioned. `loose`: its match did not hold it in every direction.
+  void add_pose(const StampedPose& pose, bool loose = false);
+  // Whether the next scan is to be matched by its points alone, too.
+  [[nodiscard]] bool wants_probe() const;
+  // Before its pose: the last scan by its points alone, and with what is believed.
+  void note_probe(const Pose& alone, const Pose& pulled);
   // Before the next pose. The world was levelled: its beginning turned with it.
   void level_world(const Pose& new_world_from_old_world);
   // Before the next pose. A loop moved the present; the world's beginning is where it was.
   void move_present(const Pose& new_world_from_old_world);
   // Before the next pose: how it lies to the poses so far is not known. A first stretch begins.
   void begin_piece();
+
+  // Whether the fixes leave the path, and by how much they have at most.
+  [[nodiscard]] const FixDrift& drift() const { return drift_; }
 
   // How the points held the last scan, see RegistrationResult.
   void note_match(const Matrix6d& information);
@@ -124,17 +132,24 @@ class SatelliteBelief {
     double turn_sd_rad = kNoTurn;
   };
 
+  // By how much the heading has to turn about up, with its standard deviation.
+  struct HeadingError {
+    double turn_rad = 0.0;
+    double sd_rad = 0.0;
+  };
+
   void begin_stretch();
   void align(const GlobalPose& on_globe, const StampedPose& pose);
   void note_course(const StampedPose& pose);
   void take_fixes(const StampedPose& pose);
   void forget_fixes();
   [[nodiscard]] double distrust_of(const FixOnPath& fix) const;
+  void note_drift(FixOnPath& on_path);
   void note_heading(const GnssFix& fix, FixOnPath& on_path) const;
   void turn_headings(const Pose& new_from_old, double sign);
   [[nodiscard]] bool is_old(const FixOnPath& fix, TimeNs now) const;
-  [[nodiscard]] std::optional<double> heading_error(const FixOnPath& newest,
-                                                    const StampedPose& predicted) const;
+  [[nodiscard]] std::optional<HeadingError> heading_error(const FixOnPath& newest,
+                                                          const StampedPose& predicted) const;
 
   SatelliteBeliefConfig config_;
   double tilt_sd_deg_;
@@ -151,6 +166,8 @@ class SatelliteBelief {
   Eigen::Vector3d forward_in_body_ = Eigen::Vector3d::Zero();
   std::optional<StampedPose> course_from_;
   std::deque<GnssFix> waiting_;
+  FixDrift drift_;
+  int since_probe_ = 0;          // scans
   std::deque<FixOnPath> fixes_;  // the newest last, over a little more than course_way_m
 };
 

@@ -1,4 +1,4 @@
-#include "understory/georeference/satellites/satellite_belief.h"
+#include "understory/georeference/satellites/in_match/satellite_belief.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -126,7 +126,7 @@ void describe(ConfigTable& table, SatelliteBeliefConfig& config) {
 }
 
 SatelliteBelief::SatelliteBelief(const SatelliteBeliefConfig& config, double tilt_sd_deg)
-    : config_(config), tilt_sd_deg_(tilt_sd_deg) {
+    : config_(config), tilt_sd_deg_(tilt_sd_deg), drift_(config.first_heading_sd_deg * kDegree) {
   begin_stretch();
 }
 
@@ -146,7 +146,18 @@ void SatelliteBelief::add_fix(const GnssFix& fix, const Vector3d& antenna_in_bod
   if (aligned()) waiting_.push_back(fix);
 }
 
-void SatelliteBelief::add_pose(const StampedPose& pose) {
+bool SatelliteBelief::wants_probe() const {
+  return config_.use == SatellitesInMatch::kPenalty && aligned() && since_probe_ + 1 >= kProbeEvery;
+}
+
+void SatelliteBelief::note_probe(const Pose& alone, const Pose& pulled) {
+  since_probe_ = 0;
+  drift_.note_pull(alone * antenna_in_body_, pulled * antenna_in_body_);
+}
+
+void SatelliteBelief::add_pose(const StampedPose& pose, bool loose) {
+  ++since_probe_;
+  drift_.add_pose(pose.world_from_body * antenna_in_body_, loose);
   if (first_) {
     note_course(pose);
     align(first_->add_pose(pose), pose);
@@ -198,6 +209,7 @@ void SatelliteBelief::take_fixes(const StampedPose& pose) {
     fixes_.push_back({fix.stamp, world_from_enu * EastNorthUp(origin_).from_place(place),
                       turned(world_from_enu, covariance), body});
     fixes_.back().distrust = distrust_of(fixes_.back());
+    note_drift(fixes_.back());
     note_heading(fix, fixes_.back());
     forget_fixes();
   }
@@ -215,6 +227,15 @@ void SatelliteBelief::note_heading(const GnssFix& fix, FixOnPath& on_path) const
   if (!(std::abs(turn) <= kMostTurnDeg * kDegree + kFarSteps * sd)) return;
   on_path.turn_rad = turn;
   on_path.turn_sd_rad = sd;
+}
+
+// A fix that has left the path may be as far off again.
+void SatelliteBelief::note_drift(FixOnPath& on_path) {
+  if (config_.use != SatellitesInMatch::kPenalty) return;  // no path beside that of the fixes
+  const double off_m = drift_.add_fix(
+      {on_path.fix_in_world, on_path.covariance, on_path.world_from_body * antenna_in_body_});
+  const double sd = std::sqrt(on_path.covariance.diagonal().minCoeff());
+  on_path.distrust = std::max(on_path.distrust, off_m / sd);
 }
 
 // One fix that lies the course's way back is enough.
@@ -260,9 +281,9 @@ std::optional<PoseBelief> SatelliteBelief::at(const StampedPose& predicted,
   if (std::isfinite(newest.turn_rad)) {
     rotation = Eigen::AngleAxisd(newest.turn_rad, Vector3d::UnitZ()) * rotation;
     attitude_sd.z() = newest.turn_sd_rad;
-  } else if (const std::optional<double> error = heading_error(newest, predicted)) {
-    rotation = Eigen::AngleAxisd(*error, Vector3d::UnitZ()) * rotation;
-    attitude_sd.z() = config_.course_sd_deg * kDegree * newest.distrust;
+  } else if (const std::optional<HeadingError> error = heading_error(newest, predicted)) {
+    rotation = Eigen::AngleAxisd(error->turn_rad, Vector3d::UnitZ()) * rotation;
+    attitude_sd.z() = error->sd_rad * newest.distrust;
   }
   AntennaBelief antenna{newest.fix_in_world + moved,
                         std::pow(newest.distrust, 2.0) * newest.covariance};
@@ -325,8 +346,8 @@ void SatelliteBelief::note_match(const Matrix6d& information) {
 }
 
 // By how much the heading has to turn for the carrier to go the way that it goes.
-std::optional<double> SatelliteBelief::heading_error(const FixOnPath& newest,
-                                                     const StampedPose& predicted) const {
+std::optional<SatelliteBelief::HeadingError> SatelliteBelief::heading_error(
+    const FixOnPath& newest, const StampedPose& predicted) const {
   const FixOnPath& oldest = fixes_.front();
   const Vector3d way = newest.fix_in_world - oldest.fix_in_world;
   const double most_s = config_.course_way_m / kSlowestCourseMS;
@@ -334,9 +355,14 @@ std::optional<double> SatelliteBelief::heading_error(const FixOnPath& newest,
       to_seconds(newest.stamp - oldest.stamp) > most_s)
     return std::nullopt;
   const Vector3d forward = forward_in_body_.normalized();
-  const Vector3d looked =
-      oldest.world_from_body.rotation() * forward + predicted.world_from_body.rotation() * forward;
-  return std::remainder(heading_of(way) - heading_of(looked), 2.0 * M_PI);
+  const Vector3d before = oldest.world_from_body.rotation() * forward;
+  const Vector3d now = predicted.world_from_body.rotation() * forward;
+  const double error = std::remainder(heading_of(way) - heading_of(before + now), 2.0 * M_PI);
+  // A carrier that turns, or looks aside, does not go where it looks.
+  const double turned = std::remainder(heading_of(now) - heading_of(before), 2.0 * M_PI);
+  if (std::abs(error) > kMostSlipDeg * kDegree || std::abs(turned) > kMostBendDeg * kDegree)
+    return std::nullopt;
+  return HeadingError{error, std::hypot(config_.course_sd_deg * kDegree, turned)};
 }
 
 // Its z axis is up from now on: what was laid on it before has its heading and place alone.
@@ -346,6 +372,7 @@ void SatelliteBelief::level_world(const Pose& new_world_from_old_world) {
     const Pose moved = new_world_from_old_world * before;
     world_from_enu_ = Pose(about_up(moved.rotation()), moved.translation());
     const Pose new_from_old = *world_from_enu_ * before.inverse();
+    drift_.move(new_from_old, Pose());
     for (FixOnPath& fix : fixes_) {
       fix.fix_in_world = new_from_old * fix.fix_in_world;
       fix.covariance = turned(new_from_old, fix.covariance);
@@ -360,6 +387,7 @@ void SatelliteBelief::move_present(const Pose& new_world_from_old_world) {
   const auto move = [&](auto& place) {
     place.world_from_body = new_world_from_old_world * place.world_from_body;
   };
+  drift_.move(Pose(), new_world_from_old_world);
   if (last_) move(*last_);
   if (course_from_) move(*course_from_);
   for (FixOnPath& fix : fixes_)
@@ -380,6 +408,8 @@ void SatelliteBelief::begin_piece() {
   course_from_.reset();
   waiting_.clear();
   fixes_.clear();
+  drift_.clear();
+  since_probe_ = 0;
 }
 
 void SatelliteBelief::save(BinaryWriter& writer) const {
@@ -410,6 +440,8 @@ void SatelliteBelief::save(BinaryWriter& writer) const {
     writer.put(fix.turn_rad);
     writer.put(fix.turn_sd_rad);
   }
+  drift_.save(writer);
+  writer.put(since_probe_);
 }
 
 void SatelliteBelief::load(BinaryReader& reader) {
@@ -445,6 +477,8 @@ void SatelliteBelief::load(BinaryReader& reader) {
     fix.turn_sd_rad = reader.get<double>();
     fixes_.push_back(fix);
   }
+  drift_.load(reader);
+  since_probe_ = reader.get<int>();
 }
 
 }  // namespace understory
