@@ -329,43 +329,6 @@ inline constexpr double kMostReach = 6.0;
 inline constexpr std::array<std::int64_t, 2> kBridges = {3, 6};
 }  // namespace tree_owners
 
-namespace tree_crowns {  // forest/trees/tree_crowns.cc
-// m: height of the layers of a crown [chosen]
-inline constexpr double kLayer = 0.5;
-// Directions in which the width of a layer is measured [chosen]
-inline constexpr std::size_t kSectors = 16;
-// Directions from one with points to the next: wider gaps are no part of the crown [chosen]
-inline constexpr std::size_t kWidestGap = 5;
-// m beyond the surface of the stem: what reaches farther is a branch [chosen]
-inline constexpr double kBranch = 0.35;
-// Quantile of the widths of the layers that is the width of a tree [chosen]
-inline constexpr double kWideQuantile = 0.9;
-// Of that width: narrower layers are no crown yet [chosen]
-inline constexpr double kBaseShare = 0.35;
-// Part of the layers from below, in which bushes may be wider than the crown: one of so many
-// [chosen]
-inline constexpr std::size_t kLowParts = 3;
-// Layers down to the next wide one that a crown may have between its own [chosen]
-inline constexpr std::size_t kBaseGap = 3;
-// Share of the cubes in a direction that lie within the edge of the crown [chosen]
-inline constexpr double kEdgeQuantile = 0.97;
-// Directions in which the reach of a whole crown is measured [tuned on `random` 1 to 6, 8, 13, 16,
-// 49 to 51 and 55 to 60: docs/method/forest-experiments.md, crowns]
-inline constexpr std::size_t kOutlineSectors = 24;
-// The edge of a crown begins at so much of the upper quartile of these reaches [tuned likewise]
-inline constexpr double kEdgeShare = 0.6;
-// Cubes that show the edge of a crown in a direction, at least [chosen]
-inline constexpr int kFewestEdgeCubes = 2;
-// Of the directions, how many must show the edge at least. Other crowns were seen from one side,
-// and their outline has 0.6 to 0.8 of their area [tuned likewise]
-inline constexpr int kFewestEdgeSectors = 15;
-// Times the gap to the edge of the crown that evenly spread cubes leave: edges are thin [tuned
-// likewise]
-inline constexpr double kThinEdge = 2.0;
-// Times the median of these: what reaches farther is of another tree [tuned likewise]
-inline constexpr double kStickingOut = 1.45;
-}  // namespace tree_crowns
-
 namespace canopy_crowns {  // forest/trees/canopy_crowns.cc
 // Times that the gaps of a canopy model shrink by a cell [chosen]
 inline constexpr int kFillPasses = 2;

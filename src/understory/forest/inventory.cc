@@ -11,6 +11,7 @@
 
 #include "understory/forest/cell_grid.h"
 #include "understory/forest/forest_constants.h"
+#include "understory/forest/form/shared_feet.h"
 #include "understory/forest/ground/uphill_side.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/tiles/stem_tiles.h"
@@ -95,11 +96,19 @@ void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3
   }
 }
 
-void add_volumes(InventoryResult& result) {
+// What the curves tell: volumes, and the forms of the stems.
+void add_stem_forms(InventoryResult& result) {
   for (std::size_t i = 0; i < result.curves.size(); ++i) {
-    result.trees[i].stem_volume_m3 = result.curves[i].volume_m3;
-    result.trees[i].stem_volume_sd_m3 = result.curves[i].volume_sd_m3;
+    Tree& tree = result.trees[i];
+    const StemCurve& curve = result.curves[i];
+    tree.stem_volume_m3 = curve.volume_m3;
+    tree.stem_volume_sd_m3 = curve.volume_sd_m3;
+    tree.sweep_m = curve.sweep_m;
+    if (curve.fork) tree.fork_m = curve.fork->height_m;
   }
+  const std::vector<std::size_t> feet = shared_feet(result.stems);
+  for (std::size_t i = 0; i < feet.size(); ++i)
+    result.trees[i].foot_id = result.trees[feet[i]].id;
 }
 
 std::vector<OwnerTree> owner_trees(const InventoryResult& result, double slices_end_m) {
@@ -138,6 +147,7 @@ void find_crowns(const CrownTask& task, TileShelf<std::uint64_t>& cubes, Invento
     result.trees[i].crown_base_m = crowns[i].base_m;
     result.trees[i].crown_area_m2 = crowns[i].area_m2;
     result.trees[i].crown_volume_m3 = crowns[i].volume_m3;
+    result.trees[i].snag = crowns[i].bare;
     for (Eigen::Vector2d& corner : crowns[i].outline)
       corner += result.origin.head<2>();
     result.crown_outlines.push_back(std::move(crowns[i].outline));
@@ -386,7 +396,7 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
   judge_tops(tops, scanner.lookouts, scanner.places, result);
   if (full) {
     result.curves = std::move(tops.curves);
-    add_volumes(result);
+    add_stem_forms(result);
     tell("crowns", 6.0);
     find_crowns(task, tops.cubes, result);
     add_crowns(config, result);

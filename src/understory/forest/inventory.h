@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "understory/forest/doubtful_trees.h"
+#include "understory/forest/form/stem_curve.h"
 #include "understory/forest/ground/ground.h"
 #include "understory/forest/stand/seen_area.h"
 #include "understory/forest/stand/stand_config.h"
 #include "understory/forest/stems/beam_footprint.h"
-#include "understory/forest/stems/stem_curve.h"
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/tiles/crown_tiles.h"
 #include "understory/forest/tiles/tiled_cloud.h"

@@ -16,19 +16,109 @@ inline constexpr double kCube = 0.02;
 inline constexpr double kReach = 0.2;
 // ... and m per metre above it, added: stems bend [chosen]
 inline constexpr double kReachPerMetre = 0.03;
+// m around the surface that show a second stem above a fork ... [as in stem_fork]
+inline constexpr double kForkReach = 0.7;
+// ... up to that height above the ground, m [as in stem_fork]
+inline constexpr double kForksUpTo = 12.0;
 // m above the ground: higher points are no tree [bound: the tallest trees have 116 m]
 inline constexpr double kHighest = 120.0;
 // Points that are gathered before they are thinned [bound: memory]
 inline constexpr std::size_t kFirstLimit = 2'000'000;
 }  // namespace stem_surroundings
 
-namespace stem_curve {  // forest/stems/stem_curve.cc
+namespace stem_fork {  // forest/form/stem_fork.cc
+// m between the sections of a curve [as in stem_curve]
+inline constexpr double kSectionStep = 0.1;
+// m above the ground: the slices begin [chosen]
+inline constexpr double kLowest = 0.75;
+// ... and end, at most [chosen: higher forks are in the crown]
+inline constexpr double kHighest = 12.0;
+// m over the last section of the stem, to which slices are searched [chosen]
+inline constexpr double kBeyond = 1.5;
+// m: height of a slice [as in stem_detector]
+inline constexpr double kSlice = 0.25;
+// m from the surface: nearer points are of the stem [chosen: bark and scatter]
+inline constexpr double kBark = 0.025;
+// ... farther ones of others [chosen]
+inline constexpr double kReach = 0.7;
+// m of the radius: thinner ones are branches [chosen]
+inline constexpr double kThinnest = 0.015;
+// Radii of the stem: a second stem has at least so many ... [chosen]
+inline constexpr double kLeastShare = 0.35;
+// ... and at most [chosen]
+inline constexpr double kMostShare = 1.3;
+// Sum of both radii: centres lie at least so far apart [chosen]
+inline constexpr double kLeastApart = 0.8;
+// Points inside of a section per point on it, at most [chosen]
+inline constexpr double kMostInside = 0.3;
+// Slices that show it, at least [chosen: half a metre]
+inline constexpr int kFewestSlices = 3;
+// Degrees: a branch leans more [chosen]
+inline constexpr double kMostLeanDeg = 40.0;
+// m/m: it goes away from the stem by that at least [chosen]
+inline constexpr double kLeastSlope = 0.08;
+// m above the ground: a lower fork is two trees [chosen]
+inline constexpr double kLowestFork = 0.2;
+// m from the fork to where it was seen, at most [chosen]
+inline constexpr double kLongestHidden = 1.5;
+// m from a section within which a point is on it [as in circle_search]
+inline constexpr double kBand = 0.02;
+// m outside of it within which others speak against it: foliage [chosen]
+inline constexpr double kAround = 0.12;
+// Weights of the logistic regression that tells a second stem from foliage and branches. The
+// constant. [tuned: random seeds 1, 2, 4-10, 13, 20 s, with stand.fork_share=0.2: 2,228 candidates,
+// of which 425 on forked trees; page forest-experiments.md, "Forks and snags"]
+inline constexpr double kBase = -4.4;
+// Log of the slices with a section [tuned: the same]
+inline constexpr double kByCount = 1.2;
+// Their share of the slices between the first and the last [tuned: the same]
+inline constexpr double kByFill = 1.37;
+// m that sections are off the plane through the stem, root mean square [tuned: the same]
+inline constexpr double kByOffLine = -3.04;
+// That counts up to here [chosen]
+inline constexpr double kMostOffLine = 0.3;
+// Log of the points on a section ... [tuned: the same]
+inline constexpr double kByPoints = 0.75;
+// ... and of those outside per point on it [tuned: the same]
+inline constexpr double kByOutside = -0.43;
+// What is added before that logarithm [chosen: a tenth]
+inline constexpr double kLittle = 0.1;
+// Log of the points on it per point on the stem in the same slices [tuned: the same]
+inline constexpr double kByShare = 1.22;
+// What is added before that one [chosen]
+inline constexpr double kLittleShare = 0.05;
+// That share counts up to here [chosen]
+inline constexpr double kFullShare = 1.5;
+// A fork is told from that on [tuned: the same; 0 finds 15 % more, with twice as many false ones]
+inline constexpr double kLeastEvidence = 0.5;
+// Seed of the draws: the same points give the same fork [chosen]
+inline constexpr std::uint64_t kSeed = 1;
+}  // namespace stem_fork
+
+namespace shared_feet {  // forest/form/shared_feet.cc
+// m/m between two slopes, below which centre lines are parallel [chosen]
+inline constexpr double kParallel = 0.01;
+// m that roots add to the radii of two stems [chosen]
+inline constexpr double kFlare = 0.05;
+// m above the ground at which the centre lines ... [chosen]
+inline constexpr double kAbove = 3.0;
+// ... are farther apart than where they are nearest, m [chosen]
+inline constexpr double kOpens = 0.1;
+// m between stems at breast height, at most, along each axis [chosen]
+inline constexpr double kFarthest = 1.5;
+}  // namespace shared_feet
+
+namespace stem_curve {  // forest/form/stem_curve.cc
 // m between the sections that are fitted [chosen]
 inline constexpr double kStep = 0.25;
 // m: half of the height of a section [chosen]
 inline constexpr double kHalfWindow = 0.3;
 // m between the sections of a curve [bound: by decimetres]
 inline constexpr double kSectionStep = 0.1;
+// m above the ground: the sweep of a stem is taken from here ... [bound: above the roots]
+inline constexpr double kSweepFrom = 0.5;
+// ... to here [bound: a sawlog]
+inline constexpr double kSweepTo = 5.0;
 // m: a top so near over a section needs none of its own [bound: the decimals of stem_curves.csv]
 inline constexpr double kSameHeight = 0.01;
 // m above the ground: the lowest section that is fitted [chosen]

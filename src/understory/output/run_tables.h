@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "understory/forest/stems/stem_curve.h"
+#include "understory/forest/form/stem_curve.h"
 #include "understory/forest/trees/tree_fall.h"
 #include "understory/geometry/stamped_pose.h"
 #include "understory/sensor/gnss_fix.h"

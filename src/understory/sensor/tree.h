@@ -28,8 +28,13 @@ struct Tree {
   double y_sd_m = kUnknown;
   double stem_volume_m3 = kUnknown;     // over bark, from the ground to the top
   double stem_volume_sd_m3 = kUnknown;  // its standard deviation
-  double crown_base_m = kUnknown;       // above the ground: where the crown begins
-  double crown_area_m2 = kUnknown;      // of its outline seen from above
+  double sweep_m = kUnknown;  // of the centre line from a straight one, between 0.5 and 5 m
+  double fork_m = kUnknown;   // above the ground: where a second stem leaves
+  // The number of the thickest of the stems that share a foot: its own where it stands alone.
+  double foot_id = kUnknown;
+  double snag = kUnknown;           // 1: it stands without a crown; 0: it has one
+  double crown_base_m = kUnknown;   // above the ground: where the crown begins
+  double crown_area_m2 = kUnknown;  // of its outline seen from above
   double crown_volume_m3 = kUnknown;
   // Seconds on the clock of the scans: from then on views that should have seen the tree did not.
   // Unknown while it stands.
@@ -64,6 +69,10 @@ inline constexpr std::array kTreeColumns = {
     TreeColumn{"y_sd_m", &Tree::y_sd_m, 4, false},
     TreeColumn{"stem_volume_m3", &Tree::stem_volume_m3, 4, false},
     TreeColumn{"stem_volume_sd_m3", &Tree::stem_volume_sd_m3, 4, false},
+    TreeColumn{"sweep_m", &Tree::sweep_m, 3, false},
+    TreeColumn{"fork_m", &Tree::fork_m, 2, false},
+    TreeColumn{"foot_id", &Tree::foot_id, 0, false},
+    TreeColumn{"snag", &Tree::snag, 0, false},
     TreeColumn{"crown_base_m", &Tree::crown_base_m, 2, false},
     TreeColumn{"crown_area_m2", &Tree::crown_area_m2, 2, false},
     TreeColumn{"crown_volume_m3", &Tree::crown_volume_m3, 2, false},

@@ -139,6 +139,22 @@ double stem_volume_m3(const GrownTree& grown) {
   return volume;
 }
 
+// The largest distance of the centre line from a straight one, between 0.5 and 5 m above the foot.
+double sweep_m(const GrownTree& grown) {
+  constexpr double kFrom = 0.5;
+  constexpr double kTo = 5.0;
+  if (stem_end_m(grown) < kTo) return Tree::kUnknown;
+  const Eigen::Vector3d from = grown.centre(kFrom);
+  const Eigen::Vector3d to = grown.centre(kTo);
+  double most = 0.0;
+  for (int i = 0; i <= 45; ++i) {
+    const double share = i / 45.0;
+    const Eigen::Vector3d centre = grown.centre(kFrom + share * (kTo - kFrom));
+    most = std::max(most, (centre - from - share * (to - from)).head<2>().norm());
+  }
+  return most;
+}
+
 // As it grew: nothing of it is uncertain.
 Tree truth_of(const GrownTree& grown, const TrueCrown& crown, const Terrain& terrain) {
   Tree tree;
@@ -157,6 +173,12 @@ Tree truth_of(const GrownTree& grown, const TrueCrown& crown, const Terrain& ter
     tree.stem_volume_m3 = stem_volume_m3(grown);
     tree.stem_volume_sd_m3 = 0.0;
   }
+  if (has_known_stem(grown)) {
+    tree.sweep_m = sweep_m(grown);
+    if (grown.fork_m > 0.0) tree.fork_m = grown.fork_m;
+    tree.snag = grown.broken_m > 0.0 ? 1.0 : 0.0;
+  }
+  tree.foot_id = grown.id;
   tree.crown_base_m = crown.base_m;
   tree.crown_area_m2 = crown.area_m2;
   tree.crown_volume_m3 = crown.volume_m3;

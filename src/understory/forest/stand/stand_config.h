@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "understory/forest/stems/taper_form.h"
+#include "understory/forest/form/taper_form.h"
 #include "understory/util/config/config.h"
 
 namespace understory {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "understory/forest/stems/taper_form.h"
+#include "understory/forest/form/taper_form.h"
 
 namespace understory {
 

@@ -26,7 +26,9 @@ std::uint64_t square_key(const Eigen::Vector2i& square) {
 
 // How far from the straight centre line the surface of a stem may be.
 double reach_at(const StemFit& stem, double height_m) {
-  return stem.radius_m + kReach + kReachPerMetre * std::max(0.0, height_m - kBreastHeight);
+  const double bent = kReach + kReachPerMetre * std::max(0.0, height_m - kBreastHeight);
+  const double beside = height_m < kForksUpTo ? kForkReach : 0.0;
+  return stem.radius_m + std::max(bent, beside);
 }
 
 constexpr std::int64_t kMiddleCube = 1 << 20;  // 21 bits each

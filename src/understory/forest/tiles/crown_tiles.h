@@ -4,9 +4,9 @@
 #include <functional>
 #include <vector>
 
+#include "understory/forest/form/stem_curve.h"
 #include "understory/forest/ground/canopy.h"
 #include "understory/forest/ground/ground.h"
-#include "understory/forest/stems/stem_curve.h"
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/tiles/stem_tiles.h"
 #include "understory/forest/tiles/tile_shelf.h"

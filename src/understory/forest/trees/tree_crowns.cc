@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "understory/forest/forest_constants.h"
+#include "understory/forest/crown_constants.h"
 #include "understory/util/median.h"
 #include "understory/util/parallel.h"
 
@@ -203,12 +203,29 @@ std::size_t base_of(const std::vector<double>& widths, double radius_m) {
   return base;
 }
 
+// Whether the upper half of a tree is a stem alone. Unknown where its stem was hardly seen up
+// there.
+double bareness(const std::vector<Places>& layers, const OwnerTree& tree) {
+  std::size_t on = 0;
+  std::size_t beside = 0;
+  for (std::size_t i = layers.size() / 2; i < layers.size(); ++i) {
+    const Eigen::Vector2d stem = centre_at(tree, (static_cast<double>(i) + 0.5) * kLayer);
+    for (const Eigen::Vector2d& place : layers[i])
+      ++((place - stem).norm() > tree.radius_m + kBeside ? beside : on);
+  }
+  const auto upper = static_cast<double>(layers.size() - layers.size() / 2);
+  if (static_cast<double>(beside) >= kMostBeside * upper) return 0.0;
+  const bool seen = std::isfinite(tree.height_m) && static_cast<double>(on) >= kLeastOnStem * upper;
+  return seen && on >= kFewestOnStem ? 1.0 : TreeCrown::kUnknown;
+}
+
 TreeCrown crown_of(const std::vector<TreeOwners::Voxel>& voxels, const OwnerTree& tree) {
   const std::vector<Places> layers = layers_of(voxels);
   std::vector<double> widths;
   for (std::size_t i = 0; i < layers.size(); ++i)
     widths.push_back(width_of(layers[i], centre_at(tree, (static_cast<double>(i) + 0.5) * kLayer)));
   TreeCrown crown;
+  crown.bare = bareness(layers, tree);
   if (widths.empty()) return crown;
   const std::size_t base = base_of(widths, tree.radius_m);
   if (base == widths.size()) return crown;

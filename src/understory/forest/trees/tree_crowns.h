@@ -16,7 +16,9 @@ struct TreeCrown {
   double base_m = kUnknown;     // above the ground: where the layers become wide and stay so
   double area_m2 = kUnknown;    // of its outline seen from above
   double volume_m3 = kUnknown;  // sum of the outlines of its layers
-  PlaneRing outline;            // seen from above: convex, against the clock, metres
+  // 1: its upper half shows a stem and nothing beside it, as a snag does; 0: it has branches.
+  double bare = kUnknown;
+  PlaneRing outline;  // seen from above: convex, against the clock, metres
 };
 
 // Base, area and volume of each crown. The area is that of the convex outline, without what sticks

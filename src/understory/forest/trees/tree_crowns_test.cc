@@ -164,6 +164,31 @@ TEST(TreeCrowns, WhereNoCrownWasSeenThereIsNoOutline) {
   EXPECT_TRUE(measure_crowns(owners, trees)[0].outline.empty());
 }
 
+TEST(TreeCrowns, ASnagIsBareInItsUpperHalf) {
+  TreeOwners owners;
+  for (double height = 0.3; height < 9.0; height += 0.1)
+    add_disc(owners, 0.1, height);
+  for (double height = 1.0; height < 3.0; height += 0.1)
+    add_disc(owners, 1.2, height);  // a bush at its foot
+  std::vector<OwnerTree> trees = {owner_tree(9.0)};
+  owners.find(trees, {});
+  EXPECT_EQ(measure_crowns(owners, trees)[0].bare, 1.0);
+  trees[0].height_m = std::nan("");
+  EXPECT_TRUE(std::isnan(measure_crowns(owners, trees)[0].bare)) << "its top was not seen";
+  EXPECT_EQ(crown_with_bush(0.0).bare, 0.0);
+}
+
+// Nothing says that a stem goes up there.
+TEST(TreeCrowns, WhatWasHardlySeenIsNoSnag) {
+  TreeOwners owners;
+  for (double height = 0.3; height < 3.5; height += 0.1)
+    add_disc(owners, 0.1, height);
+  owners.add({0.0, 0.0}, 8.9);
+  const std::vector<OwnerTree> trees = {owner_tree(9.0)};
+  owners.find(trees, {});
+  EXPECT_TRUE(std::isnan(measure_crowns(owners, trees)[0].bare));
+}
+
 TEST(TreeCrowns, ABushAtTheFootIsNotTheBase) {
   EXPECT_NEAR(crown_with_bush(0.0).base_m, 8.0, 0.51);
   EXPECT_NEAR(crown_with_bush(4.2).base_m, 8.0, 0.51);

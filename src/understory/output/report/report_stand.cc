@@ -340,6 +340,12 @@ std::vector<TableColumn> columns_of(const std::vector<Tree>& trees,
                          return i < stems->size() ? metres((*stems)[i].arc_deg, 0) : std::string();
                        }});
   if (any(&Tree::stem_volume_m3)) columns.push_back({"stem, m³", number(&Tree::stem_volume_m3, 3)});
+  if (any(&Tree::sweep_m)) columns.push_back({"sweep, cm", in_cm(&Tree::sweep_m)});
+  if (any(&Tree::fork_m)) columns.push_back({"forks at, m", number(&Tree::fork_m, 1)});
+  if (std::any_of(trees.begin(), trees.end(), [](const Tree& tree) { return tree.snag == 1.0; }))
+    columns.push_back({"snag", [&trees](std::size_t i) {
+                         return trees[i].snag == 1.0 ? std::string("yes") : std::string();
+                       }});
   if (any(&Tree::crown_base_m))
     columns.push_back({"crown from, m", number(&Tree::crown_base_m, 1)});
   if (any(&Tree::crown_area_m2)) columns.push_back({"crown, m²", number(&Tree::crown_area_m2, 1)});

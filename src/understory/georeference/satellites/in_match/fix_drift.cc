@@ -36,15 +36,14 @@ FixDrift::Departure FixDrift::departure(const Anchor& now, const Anchor& before)
   const Vector3d moved = now.antenna - before.antenna;
   const Vector3d off = (now.fix - before.fix) - moved;
   const double share = left_ ? kReturnShare : kOdometryShare;
-  const double odometry =
-      std::hypot(kOdometryM, share * (now.way_m - before.way_m) +
-                                 kLooseShare * (now.loose_m - before.loose_m));
+  const double odometry = std::hypot(kOdometryM, share * (now.way_m - before.way_m) +
+                                                     kLooseShare * (now.loose_m - before.loose_m));
   const Vector3d variance =
       now.variance + before.variance + Vector3d::Constant(odometry * odometry);
   // The map was laid on the globe with an error of its heading, which moves things aside.
   const Eigen::Vector2d aside_of = heading_sd_rad_ * Eigen::Vector2d(-moved.y(), moved.x());
-  const Eigen::Matrix2d in_plane = variance.head<2>().mean() * Eigen::Matrix2d::Identity() +
-                                   aside_of * aside_of.transpose();
+  const Eigen::Matrix2d in_plane =
+      variance.head<2>().mean() * Eigen::Matrix2d::Identity() + aside_of * aside_of.transpose();
   const Eigen::Vector2d off_plane = off.head<2>();
   const double plane_steps = std::sqrt(off_plane.dot(in_plane.inverse() * off_plane));
   const double height_steps = std::abs(off.z()) / std::sqrt(variance.z());

@@ -11,8 +11,8 @@ namespace understory {
 // A fix beside the antenna at the same time.
 struct FixAtAntenna {
   Eigen::Vector3d fix_in_world = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();      // as stated, world axes, m^2
-  Eigen::Vector3d antenna_in_world = Eigen::Vector3d::Zero();    // by the path
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();    // as stated, world axes, m^2
+  Eigen::Vector3d antenna_in_world = Eigen::Vector3d::Zero();  // by the path
 };
 
 // Tells a receiver that drifts by metres while it states centimetres, where its fixes pull at the

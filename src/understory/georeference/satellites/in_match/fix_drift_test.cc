@@ -76,7 +76,8 @@ Vector3d slides(double seconds, const Vector3d& by) {
 }
 
 TEST(FixDrift, AReceiverThatSlidesAwayHasLeftThePathThatFollowsIt) {
-  for (const Vector3d& by : {Vector3d(0.0, 3.0, 0.0), Vector3d(2.0, -2.0, 0.0), Vector3d(0.0, 0.0, 3.0)}) {
+  for (const Vector3d& by :
+       {Vector3d(0.0, 3.0, 0.0), Vector3d(2.0, -2.0, 0.0), Vector3d(0.0, 0.0, 3.0)}) {
     Carrier carrier([&](double s) { return slides(s, by); }, nothing);
     carrier.until(60.0);
     EXPECT_FALSE(carrier.drift().left()) << by.transpose();
@@ -142,7 +143,8 @@ TEST(FixDrift, MovesWithTheWorldAndGoesOnFromItsState) {
   loaded.load(reader);
   const Pose turn(Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Vector3d::UnitZ())), {5.0, 6.0, 7.0});
   loaded.move(turn, turn);
-  const FixAtAntenna fix{{240.0, 3.0, 0.0}, 0.0025 * Eigen::Matrix3d::Identity(), {240.0, 0.2, 0.0}};
+  const FixAtAntenna fix{
+      {240.0, 3.0, 0.0}, 0.0025 * Eigen::Matrix3d::Identity(), {240.0, 0.2, 0.0}};
   FixAtAntenna turned = fix;
   turned.fix_in_world = turn * fix.fix_in_world;
   turned.antenna_in_world = turn * fix.antenna_in_world;

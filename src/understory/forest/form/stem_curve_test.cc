@@ -1,4 +1,4 @@
-#include "understory/forest/stems/stem_curve.h"
+#include "understory/forest/form/stem_curve.h"
 
 #include <gtest/gtest.h>
 
@@ -67,6 +67,24 @@ TEST(StemCurve, FollowsABowedStemAsFarAsItIsSeen) {
     EXPECT_TRUE(section.measured) << height;
     EXPECT_LT((section.centre - stem.centre(height)).norm(), 0.02) << height;
   }
+}
+
+TEST(StemCurve, TheSweepIsThatOfTheLowestFiveMetres) {
+  Random random(3);
+  TestStem stem;
+  const auto sweep = [&] {
+    return measure_stem_curve(stem.points(random), stem.fit(), kTop, {}).sweep_m;
+  };
+  double most = 0.0;
+  for (double height = 0.5; height <= 5.0; height += 0.1) {
+    const double share = (height - 0.5) / 4.5;
+    const Eigen::Vector2d chord = stem.centre(0.5) + share * (stem.centre(5.0) - stem.centre(0.5));
+    most = std::max(most, (stem.centre(height) - chord).norm());
+  }
+  ASSERT_GT(most, 0.02);
+  EXPECT_NEAR(sweep(), most, 0.006);
+  stem.seen_to_m = 4.0;
+  EXPECT_TRUE(std::isnan(sweep())) << "not seen up to there";
 }
 
 TEST(StemCurve, AboveItHasTheFormAndSaysSo) {
@@ -207,13 +225,14 @@ TEST(StemCurve, WhereNothingElseIsSeenTheFormStands) {
 TEST(StemSurroundings, KeepWhatIsNearAStemByHeightAboveItsGround) {
   std::vector<StemFit> stems(2);
   stems[0].radius_m = stems[1].radius_m = 0.1;
-  stems[1].centre = {0.5, 0.0};
+  stems[1].centre = {1.5, 0.0};
   StemSurroundings surroundings(stems, {10.0, 12.0});
   surroundings.add({0.1, 0.0, 13.0});
   surroundings.add({0.101, 0.001, 13.001});  // in the cube of the first
-  surroundings.add({0.25, 0.0, 14.0});       // near both
+  surroundings.add({0.75, 0.0, 14.0});       // near both: forks are looked for so far away
   surroundings.add({0.1, 0.0, 9.0});         // under the ground
   surroundings.add({5.0, 0.0, 13.0});        // far from both
+  surroundings.add({0.75, 0.0, 24.5});       // none is looked for up there
   const auto points = surroundings.take();
   ASSERT_EQ(points.size(), 2U);
   ASSERT_EQ(points[0].size(), 2U);

@@ -1,4 +1,4 @@
-#include "understory/forest/stems/stem_curve.h"
+#include "understory/forest/form/stem_curve.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "understory/forest/form/stem_fork.h"
 #include "understory/forest/stem_curve_constants.h"
 #include "understory/forest/stems/noisy_cylinder.h"
 #include "understory/forest/stems/section_evidence.h"
@@ -241,6 +242,22 @@ class SmoothCurve {
   const StemFit& stem_;
 };
 
+// The largest distance of the centre line from a straight one.
+double sweep_of(const StemCurve& curve) {
+  if (!(curve.measured_to_m >= kSweepTo) || curve.sections.back().height_m < kSweepTo)
+    return StemCurve::kUnknown;
+  const auto first = static_cast<std::size_t>(std::lround(kSweepFrom / kSectionStep));
+  const auto last = static_cast<std::size_t>(std::lround(kSweepTo / kSectionStep));
+  const Eigen::Vector2d from = curve.sections[first].centre;
+  const Eigen::Vector2d to = curve.sections[last].centre;
+  double most = 0.0;
+  for (std::size_t i = first; i <= last; ++i) {
+    const double share = static_cast<double>(i - first) / static_cast<double>(last - first);
+    most = std::max(most, (curve.sections[i].centre - from - share * (to - from)).norm());
+  }
+  return most;
+}
+
 void add_volume(StemCurve& curve) {
   double volume = 0.0;
   double sd = 0.0;
@@ -328,6 +345,8 @@ StemCurve measure_stem_curve(std::vector<SlicePoint> points, const StemFit& stem
   const auto count = static_cast<int>(std::floor(end / kSectionStep));
   for (int i = 0; i <= count; ++i)
     curve.sections.push_back(smooth.at(i * kSectionStep));
+  curve.sweep_m = sweep_of(curve);
+  curve.fork = find_fork(points, curve);
   if (!std::isfinite(height_m)) return curve;
   if (end > count * kSectionStep + kSameHeight) curve.sections.push_back(smooth.at(end));
   add_volume(curve);

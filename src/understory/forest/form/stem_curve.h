@@ -2,10 +2,11 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <optional>
 #include <vector>
 
+#include "understory/forest/form/taper_form.h"
 #include "understory/forest/stems/stem_detector.h"
-#include "understory/forest/stems/taper_form.h"
 
 namespace understory {
 
@@ -18,6 +19,13 @@ struct CurveSection {
   bool measured = false;  // by points within a step; otherwise by the form of the taper
 };
 
+// A second stem that leaves another one.
+struct StemFork {
+  double height_m = 0.0;  // above the ground at the stem: its centre line leaves the bark
+  double from_m = 0.0;    // heights between which it was seen
+  double to_m = 0.0;
+};
+
 // The diameters of a stem from the ground to the top, every decimetre.
 struct StemCurve {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -27,6 +35,10 @@ struct StemCurve {
   double measured_to_m = kUnknown;     // height of the last measured section
   double volume_m3 = kUnknown;         // over bark, ground to top; unknown without a height
   double volume_sd_m3 = kUnknown;
+  // How far the centre line is from a straight one at most, between 0.5 and 5 m above the ground.
+  // Unknown where it was not seen up to there.
+  double sweep_m = kUnknown;
+  std::optional<StemFork> fork;  // the lowest one that was seen
 };
 
 // How a stem curve is completed.

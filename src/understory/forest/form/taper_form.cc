@@ -1,4 +1,4 @@
-#include "understory/forest/stems/taper_form.h"
+#include "understory/forest/form/taper_form.h"
 
 #include <algorithm>
 #include <array>
