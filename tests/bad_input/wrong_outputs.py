@@ -33,6 +33,10 @@ def snapshot(folder):
     return seen
 
 
+# A second in a few trees.
+SMALL_SITE = "duration_s: 1\nlidar:\n  model: VLP-16\nstand:\n  size_x_m: 30\n  size_y_m: 30\n"
+
+
 def make_inputs():
     """A second of a recording and what else the commands read; each is read to its end by some test."""
     inputs.mkdir()
@@ -56,7 +60,7 @@ def make_inputs():
     (inputs / "fixes.csv").write_text("timestamp,latitude_deg,longitude_deg,height_m\n" +
                                       "".join(f"{t},{62 + t * 1e-5},{29 + t % 7 * 1e-5},100\n" for t in range(60)))
     (inputs / "dem.asc").write_text("ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 50\n1 2\n3 4\n")
-    (inputs / "site.yaml").write_text("duration_s: 1\n")
+    (inputs / "site.yaml").write_text(SMALL_SITE)
     (inputs / "settings.yaml").write_text("run:\n  checkpoint_interval_s: 4\n")
     (inputs / "extrinsics.yaml").write_text("body_frame: imu\nbody_from_lidar: {translation_m: [0, 0, 0.1]}\n")
     (inputs / "boxes.yaml").write_text("boxes: []\n")
@@ -323,7 +327,7 @@ def beside_simulated(folder):
         (folder / name).unlink()
     # A site that would be replaced by what belongs to its recording.
     site = folder / "walk.extrinsics.yaml"
-    site.write_text("duration_s: 1\n")
+    site.write_text(SMALL_SITE)
     own = Command("simulate its own site", ["simulate", site, "-o", "OUT", "--set", "lidar.model=VLP-16"], [])
     for more in ((), ("--overwrite",)):
         assert "which is read" in expect_refused(own, "a site's own name", folder / "walk.pcap", folder, *more)

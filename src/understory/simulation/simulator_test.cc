@@ -228,6 +228,40 @@ TEST(Simulator, TrueHeightsAreThoseOfWhatStands) {
   EXPECT_GT(low, 5);
 }
 
+TEST(Simulator, DeadWoodIsInTheTruth) {
+  Simulator simulator(load_site("demo", {"duration_s=0.2", "lidar.columns=64",
+                                         "stand.stumps_per_ha=200", "stand.logs_per_ha=100"}));
+  (void)read_all(simulator);
+  const test::TemporaryFolder own;
+  const std::string folder = own / "run.truth";
+  simulator.write_truth(folder);
+  std::ifstream file(folder + "/dead_wood.csv");
+  std::string line;
+  std::getline(file, line);
+  std::map<std::string, int> count;
+  while (std::getline(file, line)) {
+    std::stringstream row(line);
+    std::string kind;
+    std::getline(row, kind, ',');
+    ++count[kind];
+    std::vector<double> cells;
+    for (std::string cell; std::getline(row, cell, ',');)
+      cells.push_back(std::stod(cell));
+    ASSERT_EQ(cells.size(), 8U) << line;
+    const double length = std::hypot(cells[3] - cells[0], cells[4] - cells[1]);
+    if (kind == "stump") {
+      EXPECT_LT(length, 1e-6) << line;
+      EXPECT_GT(cells[5], cells[2]) << line;
+    } else {
+      EXPECT_TRUE(length > 2.9 && length < 11.1) << line;
+    }
+    EXPECT_GT(cells[6], 0.1) << line;
+  }
+  EXPECT_GT(count["stump"], 20);
+  EXPECT_GT(count["log"], 10);
+  EXPECT_EQ(count.size(), 2U);
+}
+
 // By tree: diameter at breast height less the one 1.3 m above the foot, metres.
 std::map<std::string, double> uphill_differences(const std::string& folder) {
   std::map<std::string, double> at_axis;

@@ -238,6 +238,19 @@ std::string objects_text(const Stand& stand) {
   return text;
 }
 
+// Stumps and lying stems, each from one end to the other, along the centre line.
+std::string dead_wood_text(const Stand& stand) {
+  std::string text = "kind,x,y,z,x_to,y_to,z_to,diameter_m,diameter_to_m\n";
+  for (const Wood& piece : stand.dead_wood) {
+    const bool upright = (piece.to - piece.from).head<2>().norm() < 0.1;
+    text += fmt::format("{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f}\n",
+                        upright ? "stump" : "log", piece.from.x(), piece.from.y(), piece.from.z(),
+                        piece.to.x(), piece.to.y(), piece.to.z(), 2.0 * piece.radius_from_m,
+                        2.0 * piece.radius_to_m);
+  }
+  return text;
+}
+
 std::string prism_text(const std::vector<PrismSample>& prism) {
   std::string text = "timestamp,x,y,z\n";
   for (const PrismSample& sample : prism) {
@@ -357,10 +370,10 @@ std::vector<StemReturns> TruthLog::stems(std::size_t i) const {
 }
 
 bool is_truth_file(const std::string& name) {
-  constexpr std::array<const char*, 12> kNames = {
-      "trajectory.tum", "velocity.csv",    "imu_bias.csv", "returns.csv.gz",
-      "trees.csv",      "stem_curves.csv", "dtm.tif",      "total_station.csv",
-      "head.csv",       "site.yaml",       "objects.csv",  "points.laz"};
+  constexpr std::array<const char*, 13> kNames = {
+      "trajectory.tum",  "velocity.csv", "imu_bias.csv",      "returns.csv.gz", "trees.csv",
+      "stem_curves.csv", "dtm.tif",      "total_station.csv", "head.csv",       "site.yaml",
+      "objects.csv",     "points.laz",   "dead_wood.csv"};
   return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
 }
 
@@ -379,6 +392,8 @@ void write_truth_folder(const std::string& folder, const SimulatedWorld& world, 
   write_text(folder + "/stem_curves.csv", stem_curves_text(world.stand));
   if (!prism.empty()) write_text(folder + "/total_station.csv", prism_text(prism));
   if (!world.stand.objects.empty()) write_text(folder + "/objects.csv", objects_text(world.stand));
+  if (!world.stand.dead_wood.empty())
+    write_text(folder + "/dead_wood.csv", dead_wood_text(world.stand));
   if (!cuts.empty()) write_text(folder + "/head.csv", head_text(cuts));
   write_terrain(folder + "/dtm.tif", world.terrain);
   SiteConfig copy = world.site;

@@ -15,10 +15,9 @@ StemFit stem_from(const Eigen::Vector2d& foot, const Eigen::Vector2d& slope, dou
 }
 
 TEST(SharedFeet, StemsThatPartAboveTheGroundShareOne) {
-  const std::vector<StemFit> stems = {stem_from({0.0, 0.0}, {-0.1, 0.0}, 0.06),
-                                      stem_from({0.2, 0.0}, {0.15, 0.0}, 0.11),
-                                      stem_from({0.1, 0.15}, {0.0, 0.2}, 0.05),
-                                      stem_from({3.0, 0.0}, {0.1, 0.0}, 0.1)};
+  const std::vector<StemFit> stems = {
+      stem_from({0.0, 0.0}, {-0.1, 0.0}, 0.06), stem_from({0.2, 0.0}, {0.15, 0.0}, 0.11),
+      stem_from({0.1, 0.15}, {0.0, 0.2}, 0.05), stem_from({3.0, 0.0}, {0.1, 0.0}, 0.1)};
   EXPECT_EQ(shared_feet(stems), (std::vector<std::size_t>{1, 1, 1, 3}));
 }
 

@@ -106,13 +106,14 @@ class Offshoot {
       on_stem += of_stem[slice];
       off_line += std::pow(across.dot(place_of(ring)), 2) / count();
       for (const Eigen::Vector2f& point : slices[slice]) {
-        const double off = (point.cast<double>() - place_of(ring)).norm() -
-                           static_cast<double>(ring.radius_m);
+        const double off =
+            (point.cast<double>() - place_of(ring)).norm() - static_cast<double>(ring.radius_m);
         on += std::abs(off) < kBand ? 1.0 : 0.0;
         outside += off >= kBand && off < kAround ? 1.0 : 0.0;
       }
     }
-    const double seen = 1.0 + std::round((static_cast<double>(rings_.back().height_m) - from_m()) / kSlice);
+    const double seen =
+        1.0 + std::round((static_cast<double>(rings_.back().height_m) - from_m()) / kSlice);
     const double share = std::min(kFullShare, on / std::max(1.0, on_stem));
     return kBase + kByCount * std::log(count()) + kByFill * count() / seen +
            kByOffLine * std::min(kMostOffLine, std::sqrt(off_line)) +
@@ -170,8 +171,7 @@ std::optional<StemFork> find_fork(const std::vector<SlicePoint>& points, const S
   const Slices slices = slices_beside(points, curve, end_m);
   const std::vector<int> of_stem = points_of_stem(points, curve, slices.size());
   std::optional<StemFork> lowest;
-  for (const StemFit& line :
-       link_rings(rings_beside(slices, curve), kFewestSlices, kMostLeanDeg)) {
+  for (const StemFit& line : link_rings(rings_beside(slices, curve), kFewestSlices, kMostLeanDeg)) {
     const Offshoot offshoot(line.slices, curve);
     const StemFork fork = offshoot.fork();
     if (offshoot.slope() < kLeastSlope || fork.height_m < kLowestFork ||

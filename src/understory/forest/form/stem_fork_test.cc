@@ -15,9 +15,7 @@ constexpr double kBark = 0.11;
 // A straight upright stem, seen from the south, and things beside it.
 class ForkedStem {
  public:
-  ForkedStem() {
-    add_cone(Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), kBark, 0.3, 9.0);
-  }
+  ForkedStem() { add_cone(Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(), kBark, 0.3, 9.0); }
 
   // From `from_m` on upwards its centre line is `foot` + `slope` times the height over `from_m`.
   void add_cone(const Eigen::Vector2d& foot, const Eigen::Vector2d& slope, double radius_m,
@@ -39,15 +37,15 @@ class ForkedStem {
     for (int i = 0; i <= 90; ++i)
       curve.sections.push_back({0.1 * i, Eigen::Vector2d::Zero(), 2.0 * kBark, 0.005, true});
     curve.measured_to_m = 9.0;
-    std::sort(points_.begin(), points_.end(), [](const SlicePoint& a, const SlicePoint& b) {
-      return a.height_m < b.height_m;
-    });
+    std::sort(points_.begin(), points_.end(),
+              [](const SlicePoint& a, const SlicePoint& b) { return a.height_m < b.height_m; });
     return find_fork(points_, curve);
   }
 
  private:
   void add(double x, double y, double height) {
-    points_.push_back({static_cast<float>(x), static_cast<float>(y), static_cast<float>(height), 1});
+    points_.push_back(
+        {static_cast<float>(x), static_cast<float>(y), static_cast<float>(height), 1});
   }
 
   Random random_{4};
