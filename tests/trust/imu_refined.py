@@ -16,7 +16,7 @@ PATH_ALONE = ("--set", "map.enabled=false")
 cases = Cases()
 
 
-WALK = simulated("handheld", 4, 42, "lidar.model=VLP-16")
+WALK = simulated("handheld", 4, 42, "lidar.model=VLP-16", "stand.trees_per_ha=300")
 MESSAGES = read_mcap(unpacked(WALK))
 
 
