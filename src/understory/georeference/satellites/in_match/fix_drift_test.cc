@@ -93,6 +93,31 @@ TEST(FixDrift, AReceiverThatSlidesAwayHasLeftThePathThatFollowsIt) {
   }
 }
 
+// 1.7 % of the way. Each scan is only half a metre off its map, which follows the fixes, too.
+TEST(FixDrift, ASlowSlideShowsThoughTheMapFollows) {
+  Carrier carrier(
+      [](double s) { return Vector3d(std::clamp(0.05 * (s - 60.0), 0.0, 3.0), 0.0, 0.0); },
+      nothing);
+  carrier.until(60.0);
+  EXPECT_FALSE(carrier.drift().left());
+  carrier.until(115.0);
+  EXPECT_TRUE(carrier.drift().left());
+}
+
+// A map that was laid on the globe with a wrong heading leaves the fixes sideways.
+TEST(FixDrift, AWrongHeadingIsNoDriftWhereItMayBeThatWrong) {
+  for (const double heading_sd_rad : {0.0, 0.02}) {
+    FixDrift drift(heading_sd_rad);
+    const Eigen::Matrix3d stated = kStatedM * kStatedM * Eigen::Matrix3d::Identity();
+    for (int i = 0; i <= 100; ++i) {
+      const Vector3d antenna(i, 0.0, 0.0);
+      drift.add_pose(antenna, false);
+      (void)drift.add_fix({antenna + Vector3d(0.0, 0.026 * i, 0.0), stated, antenna});
+    }
+    EXPECT_EQ(drift.left(), heading_sd_rad == 0.0);
+  }
+}
+
 // Fixes are there to take such an error out.
 TEST(FixDrift, AnOdometryThatDriftsByAHundredthIsMended) {
   Carrier carrier(nothing, [](double s) { return Vector3d(0.0, 0.01 * kSpeedMS * s, 0.0); });
