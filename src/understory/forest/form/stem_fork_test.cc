@@ -92,6 +92,10 @@ TEST(StemFork, ANeighbourIsNone) {
   ForkedStem leaning;
   leaning.add_cone({0.3, 0.0}, {0.1, 0.0}, 0.1, 0.3, 6.0);
   EXPECT_FALSE(leaning.fork().has_value());
+  // Its line meets the stem at 1 m, and it is seen from 4 m on.
+  ForkedStem hidden;
+  hidden.add_cone({0.41, 0.0}, {0.1, 0.0}, 0.1, 4.0, 7.0);
+  EXPECT_FALSE(hidden.fork().has_value());
 }
 
 }  // namespace
