@@ -100,7 +100,9 @@ void FixDrift::move(const Pose& fixes, const Pose& path) {
 }
 
 void FixDrift::clear() {
+  const double farthest_m = farthest_m_;
   *this = FixDrift(heading_sd_rad_);
+  farthest_m_ = farthest_m;
 }
 
 void FixDrift::save(BinaryWriter& writer) const {

@@ -39,7 +39,7 @@ class FixDrift {
 
   // `fixes`: how the places of fixes moved in the world; `path`: how the path did.
   void move(const Pose& fixes, const Pose& path);
-  // The path begins anew.
+  // The path begins anew; farthest_m() is of the whole run.
   void clear();
 
   void save(BinaryWriter& writer) const;

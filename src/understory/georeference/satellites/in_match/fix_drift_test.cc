@@ -93,6 +93,15 @@ TEST(FixDrift, AReceiverThatSlidesAwayHasLeftThePathThatFollowsIt) {
   }
 }
 
+// A new piece of the map does not hide what happened before.
+TEST(FixDrift, AFurtherPieceKeepsTheFarthest) {
+  Carrier carrier([](double s) { return slides(s, {0.0, 3.0, 0.0}); }, nothing);
+  carrier.until(75.0);
+  carrier.drift().clear();
+  EXPECT_FALSE(carrier.drift().left());
+  EXPECT_GT(carrier.drift().farthest_m(), 2.0);
+}
+
 // 1.7 % of the way. Each scan is only half a metre off its map, which follows the fixes, too.
 TEST(FixDrift, ASlowSlideShowsThoughTheMapFollows) {
   Carrier carrier(

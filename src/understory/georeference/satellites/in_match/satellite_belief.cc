@@ -147,16 +147,16 @@ void SatelliteBelief::add_fix(const GnssFix& fix, const Vector3d& antenna_in_bod
 }
 
 bool SatelliteBelief::wants_probe() const {
-  return config_.use == SatellitesInMatch::kPenalty && aligned() && since_probe_ + 1 >= kProbeEvery;
+  return config_.use == SatellitesInMatch::kPenalty && aligned() && since_probe_ == 0;
 }
 
 void SatelliteBelief::note_probe(const Pose& alone, const Pose& pulled) {
-  since_probe_ = 0;
   drift_.note_pull(alone * antenna_in_body_, pulled * antenna_in_body_);
 }
 
 void SatelliteBelief::add_pose(const StampedPose& pose, bool loose) {
-  ++since_probe_;
+  // Also where the scan alone was held too badly to tell: each fifth is matched twice, no more.
+  since_probe_ = (since_probe_ + 1) % kProbeEvery;
   drift_.add_pose(pose.world_from_body * antenna_in_body_, loose);
   if (first_) {
     note_course(pose);
