@@ -24,7 +24,7 @@ CASES = {
                      ["--set", "keyframe.distance_m=0.4"], DENSE),
     # Far points of the scans between are kept, too.
     "full_inventory": (("handheld", 5, 9), "far_clouds.bin", 3_000_000, ["--inventory", "full"],
-                       [*DENSE, "stem_curves.csv"]),
+                       [*DENSE, "stem_curves.csv", "dead_wood.csv"]),
     "stems": (("lieksa2", 21, 60), "views.bin", 100_000,
               ["--front-end", "sparse", "--set", "run.checkpoint_interval_s=2"], STEMS),
     "stems_imu": (("harvester", 21, 24), "views.bin", 80_000,

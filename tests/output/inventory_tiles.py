@@ -14,7 +14,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
 from program import PROGRAM, program
 
-SAME = ("trees.csv", "stem_curves.csv", "dtm.tif", "chm.tif", "dsm.tif")
+SAME = ("trees.csv", "stem_curves.csv", "dead_wood.csv", "dtm.tif", "chm.tif", "dsm.tif")
 
 
 def ground(x, y):

@@ -16,11 +16,11 @@ from program import Cases, placed_recording, program
 cases = Cases()
 PATHS = ("trajectory.tum", "trajectory_imu.tum", "trajectory_partial.tum", "keyframes.tum", "odometry.tum")
 TABLES = {"states.csv.gz": (("vx", "vy", "vz"),), "gnss.csv": (("x", "y", "z"), ("residual_x", "residual_y", "residual_z")),
-          "trees.csv": (("x", "y", "z"), ("x_sd_m", "y_sd_m")), "stem_curves.csv": (("x", "y"),), "felled.csv": (("x", "y"),),
+          "trees.csv": (("x", "y", "z"), ("x_sd_m", "y_sd_m")), "stem_curves.csv": (("x", "y"),), "dead_wood.csv": (("x", "y", "z"), ("x_to", "y_to", "z_to")), "felled.csv": (("x", "y"),),
           "cuts.csv": (("x", "y", "z"),), "plots.csv": (("x", "y"),)}
 LAYERS = ("map.laz", "dtm.tif", "chm.tif", "dsm.tif", "trees.gpkg", "map.qgs", "global.csv.gz", "stems.csv.gz", "steps.csv")
 DENSE = ("trajectory.tum", "trajectory_imu.tum", "trajectory_partial.tum", "keyframes.tum", "states.csv.gz", "gnss.csv",
-         "trees.csv", "stem_curves.csv", "plots.csv", "graph.g2o")
+         "trees.csv", "stem_curves.csv", "dead_wood.csv", "plots.csv", "graph.g2o")
 BY_STEMS = ("trajectory.tum", "odometry.tum", "trees.csv", "felled.csv", "gnss.csv")
 
 

@@ -108,9 +108,10 @@ void add_inventory_command(CLI::App& app, Command& chosen) {
   command->add_flag("--print-config", options->print_config, "Print every key and its meaning");
   command->add_flag("--overwrite", options->request.overwrite, kOverwriteMeaning);
   command->footer(
-      "Writes trees.csv, stem_curves.csv, trees.gpkg, map.laz, dtm.tif, chm.tif, dsm.tif, "
-      "map.qgs,\n"
-      "report.html and run.json; with plots also plots.csv and plot_classes.csv, with --copc "
+      "Writes trees.csv, stem_curves.csv, dead_wood.csv, trees.gpkg, map.laz, dtm.tif, chm.tif, "
+      "dsm.tif,\n"
+      "map.qgs, report.html and run.json; with plots also plots.csv and plot_classes.csv, with "
+      "--copc "
       "map.copc.laz.\n"
       "Examples:\n  understory inventory plot.laz -o plot-inventory\n"
       "  understory inventory plot.laz --plots 512.5,847.0,9 -o plot-inventory\n"

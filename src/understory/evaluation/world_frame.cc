@@ -35,7 +35,8 @@ struct Columns {
 };
 // Standard deviations turn without a sign. Biases of the IMU and covariances of poses are in the
 // axes of the body, covariances of fixes in those of the receiver: neither turns.
-constexpr std::array<Columns, 4> kTurnedColumns = {{{"x", "y", "z"},
+constexpr std::array<Columns, 5> kTurnedColumns = {{{"x", "y", "z"},
+                                                    {"x_to", "y_to", "z_to"},
                                                     {"vx", "vy", "vz"},
                                                     {"residual_x", "residual_y", "residual_z"},
                                                     {"x_sd_m", "y_sd_m", ""}}};
@@ -181,6 +182,7 @@ const std::vector<std::string>& world_files() {
                                                  "gnss.csv",
                                                  "trees.csv",
                                                  "stem_curves.csv",
+                                                 "dead_wood.csv",
                                                  "felled.csv",
                                                  "cuts.csv",
                                                  "plots.csv"};

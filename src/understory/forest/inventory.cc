@@ -315,6 +315,7 @@ void describe(ConfigTable& table, InventoryConfig& config) {
   });
   table.section("beam", [&] { describe(table, config.beam); });
   table.section("crowns", [&] { describe(table, config.crowns); });
+  table.section("dead_wood", [&] { describe(table, config.dead_wood); });
   table.section("ground", [&] { describe(table, config.ground); });
   table.section("stems", [&] { describe(table, config.stems); });
   table.section("stand", [&] { describe(table, config.stand); });
@@ -400,6 +401,9 @@ void measure_above(const TiledCloud& cloud, const InventoryConfig& config,
     tell("crowns", 6.0);
     find_crowns(task, tops.cubes, result);
     add_crowns(config, result);
+    result.dead_wood = find_dead_wood(
+        {cloud, result.ground.terrain, result.origin, result.stems, config.dead_wood, progress},
+        tops.low);
   }
   describe_trees(config, images, result);
   look_at_doubtful_trees(std::move(tops.sheets), result);

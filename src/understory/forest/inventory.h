@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/forest/dead_wood/dead_wood.h"
 #include "understory/forest/doubtful_trees.h"
 #include "understory/forest/form/stem_curve.h"
 #include "understory/forest/ground/ground.h"
@@ -51,6 +52,7 @@ struct InventoryConfig {
   BeamConfig beam;
   StemCurveConfig curves;
   CanopyCrownConfig crowns;  // of a full inventory
+  DeadWoodConfig dead_wood;  // the same
   StandTableConfig stand;
   double canopy_cell_m = 0.5;
   int segments = 6;  // trees whose points are kept for a look at them
@@ -80,6 +82,7 @@ struct InventoryResult {
   // Instead of the owners where the cloud lies in several tiles; not without the cloud.
   std::shared_ptr<OwnerTiles> owner_tiles;
   std::optional<CanopyCrowns> crowns;  // where trees were found by them
+  std::vector<DeadWood> dead_wood;     // of a full inventory: stumps, then lying stems
   std::vector<int> crown_ids;  // id of the tree of each crown, 0 where it is none of the list
   // The thinned points between 0.5 m and 3.5 m that were searched; of a cloud in several tiles some
   // of those near breast height.

@@ -152,6 +152,22 @@ void write_stem_curves(const std::filesystem::path& path, const std::vector<Tree
   file.commit();
 }
 
+void write_dead_wood(const std::filesystem::path& path, const std::vector<DeadWood>& pieces) {
+  AtomicTextFile file(path);
+  file.write(
+      "id,kind,x,y,z,x_to,y_to,z_to,diameter_m,diameter_to_m,diameter_sd_m,length_m,volume_m3,"
+      "observations\n");
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    const DeadWood& piece = pieces[i];
+    file.write(fmt::format(
+        "{},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{:.4f},{}\n",
+        i + 1, dead_wood_name(piece.kind), piece.from.x(), piece.from.y(), piece.from.z(),
+        piece.to.x(), piece.to.y(), piece.to.z(), piece.diameter_m, piece.diameter_to_m,
+        piece.diameter_sd_m, piece.length_m(), piece.volume_m3(), piece.observations));
+  }
+  file.commit();
+}
+
 void write_tree_falls(const std::filesystem::path& path, const std::vector<TreeFall>& falls) {
   AtomicTextFile file(path);
   file.write("id,x,y,seen_until,gone_since,missed\n");

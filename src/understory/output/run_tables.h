@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/forest/dead_wood/dead_wood.h"
 #include "understory/forest/form/stem_curve.h"
 #include "understory/forest/trees/tree_fall.h"
 #include "understory/geometry/stamped_pose.h"
@@ -102,6 +103,10 @@ void write_trees_csv(const std::filesystem::path& path, const std::vector<Tree>&
 // the order of `trees`; their centres are relative to `origin`.
 void write_stem_curves(const std::filesystem::path& path, const std::vector<Tree>& trees,
                        const std::vector<StemCurve>& curves, const Eigen::Vector2d& origin);
+
+// dead_wood.csv: `id,kind,x,y,z,x_to,y_to,z_to,diameter_m,diameter_to_m,diameter_sd_m,length_m,
+// volume_m3,observations`; lengths of stumps are their heights.
+void write_dead_wood(const std::filesystem::path& path, const std::vector<DeadWood>& pieces);
 
 // felled.csv: `id,x,y,seen_until,gone_since,missed`.
 void write_tree_falls(const std::filesystem::path& path, const std::vector<TreeFall>& falls);

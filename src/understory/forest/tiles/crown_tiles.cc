@@ -148,6 +148,7 @@ class TileAbove {
   [[nodiscard]] OccupiedSpace take_space() { return std::move(space_); }
   [[nodiscard]] CanopyGrid take_canopy() { return std::move(canopy_); }
   [[nodiscard]] std::vector<std::uint64_t> take_cubes() { return owners_.take_cubes(); }
+  [[nodiscard]] std::vector<SlicePoint> take_low() { return low_.take(); }
 
  private:
   void add(const Eigen::Vector3d& point, double height) {
@@ -167,6 +168,7 @@ class TileAbove {
     }
     if (!task_.full) return;
     surroundings_->add(point);
+    if (LowPoints::holds(height) && area_.contains(low_.corner_of(place))) low_.add(place, height);
     if (height > task_.ground.config.class_m && area_.contains(TreeOwners::corner_of(place)))
       owners_.add(place, height);
   }
@@ -182,6 +184,7 @@ class TileAbove {
   CanopyGrid canopy_;
   OccupiedSpace space_;
   TreeOwners owners_;
+  LowPoints low_;
   std::vector<HeldBack> held_back_;
   std::vector<double> tops_;     // of around_
   std::vector<double> reached_;  // the same, with the crowns of neighbours above them
@@ -200,7 +203,8 @@ StemTops look_up(const CrownTask& task, double canopy_cell_m, const ListedHeight
                   {{}, std::vector<SeenSides>(task.stems.size())},
                   CanopyGrid(canopy_cell_m),
                   {},
-                  TileShelf<std::uint64_t>(tiles, task.cloud.scratch())};
+                  TileShelf<std::uint64_t>(tiles, task.cloud.scratch()),
+                  TileShelf<SlicePoint>(tiles, task.cloud.scratch())};
   if (task.full) result.curves.resize(task.stems.size());
   std::vector<std::optional<CanopyGrid>> canopies(tiles);
   std::vector<OccupiedSpace> spaces(tiles);
@@ -217,6 +221,7 @@ StemTops look_up(const CrownTask& task, double canopy_cell_m, const ListedHeight
     canopies[tile] = above.take_canopy();
     spaces[tile] = above.take_space();
     result.cubes.put(tile, above.take_cubes());
+    result.low.put(tile, above.take_low());
   });
   for (std::optional<CanopyGrid>& canopy : canopies) {
     result.canopy.add(*canopy);

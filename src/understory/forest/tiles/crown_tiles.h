@@ -4,6 +4,7 @@
 #include <functional>
 #include <vector>
 
+#include "understory/forest/dead_wood/dead_wood.h"
 #include "understory/forest/form/stem_curve.h"
 #include "understory/forest/ground/canopy.h"
 #include "understory/forest/ground/ground.h"
@@ -48,6 +49,7 @@ struct StemTops {
   CanopyGrid canopy;
   OccupiedSpace space;             // where it is asked for
   TileShelf<std::uint64_t> cubes;  // of each tile: see TreeOwners
+  TileShelf<SlicePoint> low;       // of each tile of a full inventory: see LowPoints
 };
 
 // Height of a stem's top as it is listed, from what the cloud shows: NaN where it may go on.

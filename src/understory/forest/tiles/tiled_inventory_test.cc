@@ -61,6 +61,27 @@ class SortedCloud : public TiledCloud {
   std::vector<std::vector<Eigen::Vector3d>> points_;
 };
 
+// Lying stems across borders of tiles, and stumps on them.
+void add_dead_wood(TestPlot& plot, Random& random) {
+  for (const double middle : {20.3, 25.0, 49.0, 76.0}) {
+    for (int i = 0; i < 3'000; ++i) {
+      const double along = random.uniform(-4.0, 4.0);
+      const double turn = random.uniform(-0.1 * M_PI, 1.1 * M_PI);
+      const double r = 0.15 + random.normal(0.0, 0.006);
+      const double x = middle + along;
+      const double y = 15.5 + 0.1 * along + r * std::cos(turn);
+      plot.cloud.emplace_back(x, y, plot.ground(x, 15.5) + 0.12 + r * std::sin(turn));
+    }
+    for (int i = 0; i < 500; ++i) {
+      const double turn = random.uniform(0.0, 2.0 * M_PI);
+      const double r = 0.14 + random.normal(0.0, 0.006);
+      const double y = 14.3;
+      plot.cloud.emplace_back(middle + r * std::cos(turn), y + r * std::sin(turn),
+                              plot.ground(middle, y) + random.uniform(0.0, 0.45));
+    }
+  }
+}
+
 // A strip of 100 m by 12 m on a slope, longer than a tile and its surroundings. Stems stand at the
 // borders of 20 and 25 m and elsewhere, with a hedge and undergrowth.
 const Cloud& strip_of_stems() {
@@ -95,6 +116,7 @@ const Cloud& strip_of_stems() {
     // Young trees, on borders of tiles and beside them.
     for (const double x : {19.9, 25.1, 40.6, 49.95, 75.0})
       plot.add_young_tree(x, 17.0 + std::sin(x), 0.035, 3.2);
+    add_dead_wood(plot, random);
     for (int i = 0; i < 24'000; ++i) {
       const double x = random.uniform(0.0, 100.0);
       const double y = 20.0 + 4.0 * std::sin(0.2 * x) + random.normal(0.0, 0.04);
@@ -121,7 +143,20 @@ void expect_same(const Raster& a, const Raster& b) {
     expect_same(static_cast<double>(a.values[i]), static_cast<double>(b.values[i]));
 }
 
+void expect_same(const std::vector<DeadWood>& a, const std::vector<DeadWood>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].kind, b[i].kind);
+    EXPECT_EQ(a[i].from, b[i].from);
+    EXPECT_EQ(a[i].to, b[i].to);
+    EXPECT_EQ(a[i].diameter_m, b[i].diameter_m);
+    EXPECT_EQ(a[i].diameter_sd_m, b[i].diameter_sd_m);
+    EXPECT_EQ(a[i].observations, b[i].observations);
+  }
+}
+
 void expect_same(const InventoryResult& a, const InventoryResult& b) {
+  expect_same(a.dead_wood, b.dead_wood);
   EXPECT_EQ(a.points, b.points);
   EXPECT_EQ(a.area_m2, b.area_m2);
   EXPECT_EQ(a.remarks, b.remarks);
@@ -131,10 +166,11 @@ void expect_same(const InventoryResult& a, const InventoryResult& b) {
   for (std::size_t i = 0; i < a.trees.size(); ++i) {
     const Tree& one = a.trees[i];
     const Tree& other = b.trees[i];
-    for (const auto member : {&Tree::x, &Tree::y, &Tree::z, &Tree::dbh_m, &Tree::dbh_sd_m,
-                              &Tree::height_m, &Tree::lean_deg, &Tree::x_sd_m, &Tree::y_sd_m,
-                              &Tree::stem_volume_m3, &Tree::stem_volume_sd_m3, &Tree::crown_base_m,
-                              &Tree::crown_area_m2, &Tree::crown_volume_m3})
+    for (const auto member :
+         {&Tree::x, &Tree::y, &Tree::z, &Tree::dbh_m, &Tree::dbh_sd_m, &Tree::height_m,
+          &Tree::lean_deg, &Tree::x_sd_m, &Tree::y_sd_m, &Tree::stem_volume_m3,
+          &Tree::stem_volume_sd_m3, &Tree::crown_base_m, &Tree::crown_area_m2,
+          &Tree::crown_volume_m3, &Tree::fork_m, &Tree::sweep_m})
       expect_same(one.*member, other.*member);
     EXPECT_EQ(one.observations, other.observations);
     EXPECT_EQ(one.id, other.id);
@@ -176,6 +212,11 @@ TEST(TiledInventory, TheSameTreesWhateverTheTilesAre) {
   const auto young = std::count_if(whole.stems.begin(), whole.stems.end(),
                                    [](const StemFit& stem) { return stem.in_foliage; });
   EXPECT_GE(young, 3);
+  const auto logs =
+      std::count_if(whole.dead_wood.begin(), whole.dead_wood.end(),
+                    [](const DeadWood& piece) { return piece.kind == DeadWoodKind::kLog; });
+  EXPECT_GE(logs, 3);
+  EXPECT_GE(static_cast<std::ptrdiff_t>(whole.dead_wood.size()) - logs, 3);
   const std::vector<std::uint32_t> labels = labels_of(whole, nullptr);
   bool backwards = false;
   for (const double tile_m : {128.0, 50.0, 25.0, 20.3}) {

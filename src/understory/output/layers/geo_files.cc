@@ -5,6 +5,7 @@
 #include <gdal_priv.h>
 #include <ogrsf_frmts.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cmath>
@@ -291,6 +292,44 @@ void add_crowns(GDALDataset& dataset, const std::vector<CrownOutline>& crowns,
   }
 }
 
+// The pieces of one kind: a layer with its rows. They have the ids of dead_wood.csv.
+void add_dead_wood(GDALDataset& dataset, const std::vector<DrawnWood>& pieces, DeadWoodKind kind,
+                   const std::string& crs_wkt, const std::filesystem::path& path) {
+  const bool stumps = kind == DeadWoodKind::kStump;
+  const auto of_kind = [&](const DrawnWood& one) { return one.piece.kind == kind; };
+  if (std::none_of(pieces.begin(), pieces.end(), of_kind)) return;
+  OGRLayer* layer =
+      add_layer(dataset, stumps ? "stumps" : "logs", stumps ? wkbPoint25D : wkbLineString25D,
+                crs_wkt, stumps ? "stumps at their foot" : "lying stems from the thick end", path);
+  add_field(*layer, "id", OFTInteger, path);
+  const char* length = stumps ? "height_m" : "length_m";
+  for (const char* name : {"diameter_m", "diameter_to_m", "diameter_sd_m", length, "volume_m3"})
+    add_field(*layer, name, OFTReal, path);
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    if (!of_kind(pieces[i])) continue;
+    const DeadWood& piece = pieces[i].piece;
+    const std::unique_ptr<OGRFeature> feature(new OGRFeature(layer->GetLayerDefn()));
+    feature->SetField("id", static_cast<int>(i) + 1);
+    feature->SetField("diameter_m", piece.diameter_m);
+    feature->SetField("diameter_to_m", piece.diameter_to_m);
+    feature->SetField("diameter_sd_m", piece.diameter_sd_m);
+    feature->SetField(length, piece.length_m());
+    feature->SetField("volume_m3", piece.volume_m3());
+    const Eigen::Vector3d& from = pieces[i].from;
+    const Eigen::Vector3d& to = pieces[i].to;
+    OGRPoint foot(from.x(), from.y(), from.z());
+    OGRLineString line;
+    line.addPoint(&foot);
+    line.addPoint(to.x(), to.y(), to.z());
+    if (stumps) {
+      feature->SetGeometry(&foot);
+    } else {
+      feature->SetGeometry(&line);
+    }
+    if (layer->CreateFeature(feature.get()) != OGRERR_NONE) fail(path);
+  }
+}
+
 // An empty package under the name that it has until it is whole.
 GDALDatasetUniquePtr new_package(const std::filesystem::path& path) {
   // The same rows give the same bytes: without this the file holds the time of writing.
@@ -358,6 +397,8 @@ void write_trees_gpkg(const std::filesystem::path& path, const std::vector<Tree>
   if (plotted != nullptr) add_plots(*plotted, layers.plots, path);
   add_looks(*dataset, layers.look_again, crs_wkt, path);
   add_crowns(*dataset, layers.crowns, trees, crs_wkt, path);
+  for (const DeadWoodKind kind : {DeadWoodKind::kStump, DeadWoodKind::kLog})
+    add_dead_wood(*dataset, layers.dead_wood, kind, crs_wkt, path);
   if (dataset->CommitTransaction() != OGRERR_NONE) fail(path);
   close(std::move(dataset), path);
 }

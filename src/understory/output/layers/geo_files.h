@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "understory/forest/dead_wood/dead_wood.h"
 #include "understory/forest/stand/stand_table.h"
 #include "understory/geometry/plane/plot_shape.h"
 #include "understory/geometry/raster.h"
@@ -40,12 +41,20 @@ struct CrownOutline {
   std::vector<PlaneRing> rings;  // frame of the layer; each hole after the ring around it
 };
 
+// A stump or a lying stem on a map, with its ends in the frame of the layer.
+struct DrawnWood {
+  DeadWood piece;  // as it was measured
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();
+  Eigen::Vector3d to = Eigen::Vector3d::Zero();
+};
+
 // What trees.gpkg holds beside the layer `trees`. A layer without rows is left out.
 struct TreeLayers {
   PathLine path;                      // `path`
   std::vector<LookPoint> look_again;  // `look_again`
   std::vector<StandPlot> plots;       // `plots`: their rings `drawn`, as polygons
   std::vector<CrownOutline> crowns;   // `crowns`: polygons, with what trees.csv says of each crown
+  std::vector<DrawnWood> dead_wood;   // `stumps`: points; `logs`: lines from the thick end
   std::string heights;                // what z is above
 };
 

@@ -91,6 +91,12 @@ void move_shape(const Mover& mover, OGRGeometry& shape) {
     point.setX(at.x());
     point.setY(at.y());
     point.setZ(at.z());
+  } else if (type == wkbLineString) {
+    OGRLineString& line = *shape.toLineString();
+    for (int i = 0; i < line.getNumPoints(); ++i) {
+      const Vector3d at = mover.place({line.getX(i), line.getY(i), line.getZ(i)});
+      line.setPoint(i, at.x(), at.y(), at.z());
+    }
   } else if (type == wkbMultiPolygon) {
     for (OGRPolygon* part : *shape.toMultiPolygon()) {
       for (OGRLinearRing* ring : *part)
@@ -158,7 +164,7 @@ void add_moved_vectors(const std::filesystem::path& from_file, const std::filesy
   GDALDatasetUniquePtr target(GDALDataset::Open(to_file.c_str(), GDAL_OF_VECTOR | GDAL_OF_UPDATE));
   if (target == nullptr) fail_at(to_file);
   const Mover mover(move, mean_height(*source));
-  for (const char* name : {"plots", "look_again", "crowns"}) {
+  for (const char* name : {"plots", "look_again", "crowns", "stumps", "logs"}) {
     OGRLayer* own = source->GetLayerByName(name);
     if (own == nullptr) continue;
     OGRLayer& layer = layer_like(*own, *target, move.to, to_file);

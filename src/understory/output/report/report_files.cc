@@ -16,9 +16,10 @@ struct ResultFile {
 };
 
 // In the order in which a user wants them; docs/reference/outputs.md has their columns.
-constexpr std::array<ResultFile, 29> kResultFiles = {
+constexpr std::array<ResultFile, 30> kResultFiles = {
     {{"trees.csv", "one row a tree: place, diameter, height", "a spreadsheet, QGIS"},
      {"stem_curves.csv", "diameters along each stem", "a spreadsheet"},
+     {"dead_wood.csv", "stumps and lying stems", "a spreadsheet"},
      {"map.qgs", "all layers of this folder on one map", "QGIS: double-click"},
      {"trees.gpkg", "the same trees as points on a map, the path, and places to walk to",
       "QGIS: drag the file into the window"},

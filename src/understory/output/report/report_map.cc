@@ -262,6 +262,7 @@ std::string map_svg(const ReportInput& input, const MapView& view) {
   if (input.picture != nullptr && !input.picture->empty()) svg += picture_svg(*input.picture, view);
   if (input.inventory != nullptr) svg += thin_svg(*input.inventory, view);
   if (input.inventory != nullptr) svg += crowns_svg(*input.inventory, view);
+  if (input.inventory != nullptr) svg += dead_wood_svg(*input.inventory, view);
   if (const std::vector<Tree>* trees = report_trees(input)) svg += trees_svg(*trees, view);
   if (!input.falls.empty()) svg += falls_svg(input.falls, view);
   svg += loops_svg(input.loops, view);
@@ -304,6 +305,10 @@ std::string map_legend(const ReportInput& input) {
     entry(" class=\"box\"", "background:#4f9a4a", "vegetation, the lighter the higher");
   }
   legend += tree_legend(input);
+  if (input.inventory != nullptr && !input.inventory->dead_wood.empty()) {
+    entry(" class=\"box\"", "border:2px solid #8a5a2b", "stump");
+    entry("", "border-color:#8a5a2b", "lying stem");
+  }
   if (input.inventory != nullptr && !input.inventory->thin.corners.empty())
     legend += "<span><i class=\"box thin\"></i>thin coverage: stems may be missing</span> ";
   if (input.inventory != nullptr && !input.inventory->look_again.empty())

@@ -19,6 +19,9 @@ namespace understory {
 [[nodiscard]] std::string look_svg(const InventoryResult& inventory, const MapView& view);
 // Below it, the places in words; empty where there are none.
 [[nodiscard]] std::string look_list(const InventoryResult& inventory, const MapView& view);
+// Stumps and lying stems: on the map, and in words and a table. Empty where there are none.
+[[nodiscard]] std::string dead_wood_svg(const InventoryResult& inventory, const MapView& view);
+[[nodiscard]] std::string dead_wood_part(const InventoryResult& inventory, WorldFrame world_frame);
 // Where the run lies on the globe, how that was found and how sure it is.
 [[nodiscard]] std::string place_section(const ReportInput& input);
 [[nodiscard]] std::string distrust_section(const ReportInput& input);

@@ -461,6 +461,7 @@ std::string stand_section(const ReportInput& input) {
   if (!inventory.trees.empty())
     html += single_trees(inventory) + sheets_part(inventory) +
             tree_table(inventory.trees, &inventory.stems, true, {0, input.world_frame});
+  html += dead_wood_part(inventory, input.world_frame);
   return html + "</section>\n";
 }
 

@@ -36,6 +36,24 @@ std::string doubts_text(const StandDoubts& doubts) {
 
 }  // namespace
 
+namespace {
+
+void note_dead_wood(const std::vector<DeadWood>& pieces, RunSummary& summary) {
+  std::int64_t stumps = 0;
+  std::int64_t logs = 0;
+  double volume_m3 = 0.0;
+  for (const DeadWood& piece : pieces) {
+    const bool log = piece.kind == DeadWoodKind::kLog;
+    ++(log ? logs : stumps);
+    if (log) volume_m3 += piece.volume_m3();
+  }
+  summary.counts["stumps"] = stumps;
+  summary.counts["logs"] = logs;
+  summary.quality["logs_volume_m3"] = volume_m3;
+}
+
+}  // namespace
+
 StandNotes notes_on(const InventoryResult& inventory) {
   StandNotes notes;
   const StandDoubts doubts = doubts_of(inventory.trees);
@@ -67,6 +85,8 @@ void note_doubts(const InventoryResult& inventory, RunSummary& summary) {
   count("trees_by_crown", doubts.by_crown);
   count("look_again_places", inventory.look_again.size());
   count("look_again_trees", trees_at(inventory.look_again));
+  const bool full = !inventory.curves.empty() || !inventory.dead_wood.empty();
+  if (full) note_dead_wood(inventory.dead_wood, summary);
   summary.quality["thin_coverage_share"] = inventory.thin.share;
 }
 

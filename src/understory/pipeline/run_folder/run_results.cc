@@ -26,6 +26,7 @@ const std::vector<std::string>& result_names() {
                                                  "map.copc.laz",
                                                  "trees.csv",
                                                  "stem_curves.csv",
+                                                 "dead_wood.csv",
                                                  "felled.csv",
                                                  "cuts.csv",
                                                  "trees.gpkg",

@@ -36,7 +36,7 @@ function readMap(svg) {
     stands: all('.stand').map((g) => ({
       x: number(g, 'data-x'), y: number(g, 'data-y'), text: g.querySelector('text').textContent,
     })),
-    lines: all('.look-sights path, .way path, .loops path').map((p) => ({
+    lines: all('.wood path, .look-sights path, .way path, .loops path').map((p) => ({
       path: new Path2D(p.getAttribute('d')), colour: getComputedStyle(p).stroke,
       width: number(p, 'stroke-width'), look: p.parentNode.classList.contains('look-sights'), dashed: p.hasAttribute('stroke-dasharray'),
     })),
