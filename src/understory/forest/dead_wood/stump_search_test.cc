@@ -69,6 +69,20 @@ TEST(StumpSearch, WhatGoesOnUpwardsIsNone) {
   EXPECT_TRUE(scene.search().empty());
 }
 
+TEST(StumpSearch, IsAMetreHighAtMost) {
+  StumpScene scene;
+  scene.add_wall({3.0, 4.0}, 0.2, 0.05, 0.9);
+  EXPECT_EQ(scene.search().size(), 1U);
+  scene.add_wall({3.0, 4.0}, 0.2, 0.9, 1.3);  // a broken stem: a snag
+  EXPECT_TRUE(scene.search().empty());
+}
+
+TEST(StumpSearch, StandsOnTheGround) {
+  StumpScene scene;
+  scene.add_wall({3.0, 4.0}, 0.15, 0.45, 0.8);
+  EXPECT_TRUE(scene.search().empty());
+}
+
 TEST(StumpSearch, ABoulderIsNone) {
   StumpScene scene;
   scene.add_wall({3.0, 4.0}, 0.35, 0.05, 0.4, 0.8);
