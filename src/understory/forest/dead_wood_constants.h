@@ -147,7 +147,8 @@ inline constexpr double kMostInsideLog = 0.15;
 inline constexpr double kMostLogScatter = 0.025;
 // Points per area around the surface over those on it, at most [chosen]
 inline constexpr double kMostOutside = 0.07;
-// Times the standard deviation that a fit with free points has [tuned on random seeds 1, 2, 4-6, 8-10]
+// Times the standard deviation that a fit with free points has [tuned on random seeds 1, 2, 4-6,
+// 8-10]
 inline constexpr double kSdTimes = 1.5;
 // m: how a log differs from a cone, as a standard deviation of its diameter [tuned likewise]
 inline constexpr double kFormSd = 0.015;

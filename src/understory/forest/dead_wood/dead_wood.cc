@@ -94,7 +94,9 @@ double DeadWood::volume_m3() const {
 
 LowPoints::LowPoints() : thinner_(kCube) {}
 
-bool LowPoints::holds(double height_m) { return height_m >= kLowest && height_m < kHighestLow; }
+bool LowPoints::holds(double height_m) {
+  return height_m >= kLowest && height_m < kHighestLow;
+}
 
 void LowPoints::add(const Eigen::Vector2d& place, double height_m) {
   thinner_.add(place.x(), place.y(), height_m);
@@ -104,10 +106,11 @@ Eigen::Vector2d LowPoints::corner_of(const Eigen::Vector2d& place) const {
   return thinner_.corner_of(place.x(), place.y());
 }
 
-std::vector<SlicePoint> LowPoints::take() { return thinner_.take(); }
+std::vector<SlicePoint> LowPoints::take() {
+  return thinner_.take();
+}
 
-std::vector<DeadWood> find_dead_wood(const DeadWoodTask& task,
-                                     const TileShelf<SlicePoint>& low) {
+std::vector<DeadWood> find_dead_wood(const DeadWoodTask& task, const TileShelf<SlicePoint>& low) {
   Raster ground = task.ground;
   ground.x0 -= task.origin.x();
   ground.y0 -= task.origin.y();

@@ -100,9 +100,8 @@ std::optional<Piece> start_at(const Points& points, const std::vector<std::size_
                               std::uint64_t place) {
   const Eigen::Vector3d middle = points.at(cell[cell.size() / 2]);
   std::vector<Eigen::Vector3d> near;
-  points.along(middle, middle, 1.0 + kSeedCell, [&](std::size_t i) {
-    near.push_back(points.at(i));
-  });
+  points.along(middle, middle, 1.0 + kSeedCell,
+               [&](std::size_t i) { near.push_back(points.at(i)); });
   thin_out(near);
   Random random(kLogSeed, place);
   std::optional<Piece> best;
@@ -227,11 +226,10 @@ Cover cover_of(const Points& points, const Piece& piece) {
                  }
                });
   // From the middle outwards, without wide gaps.
-  const auto middle = static_cast<std::ptrdiff_t>(
-      (0.5 * (piece.low_m + piece.high_m) - low) / kPiece);
+  const auto middle =
+      static_cast<std::ptrdiff_t>((0.5 * (piece.low_m + piece.high_m) - low) / kPiece);
   const auto most_empty = static_cast<int>(kLongestGap / kPiece);
-  Cover cover{0, std::numeric_limits<double>::infinity(),
-              -std::numeric_limits<double>::infinity()};
+  Cover cover{0, std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   const auto walk = [&](std::ptrdiff_t from, std::ptrdiff_t step) {
     int empty = 0;
     for (std::ptrdiff_t i = from;
@@ -297,8 +295,8 @@ struct LogSight {
 LogSight look_at(const Points& points, const Piece& piece) {
   LogSight sight;
   ArcBins arc;
-  std::vector<ArcBins> sections(
-      static_cast<std::size_t>((piece.high_m - piece.low_m) / kSection) + 1);
+  std::vector<ArcBins> sections(static_cast<std::size_t>((piece.high_m - piece.low_m) / kSection) +
+                                1);
   const Eigen::Matrix3d frame = upright_frame(piece.along);
   points.along(piece.place + piece.low_m * piece.along, piece.place + piece.high_m * piece.along,
                piece.radius_m + kBeside, [&](std::size_t i) {
@@ -331,8 +329,7 @@ bool is_log(const StemFitResult& fit, const Piece& piece, const LogSight& sight)
   return piece.high_m - piece.low_m >= std::max(kShortestLog, kLeastSlender * diameter) &&
          sight.arc_deg >= kLeastLogArc && sight.round_share >= kRoundShare &&
          sight.inside <= kMostInsideLog * sight.on && sight.lowest_m <= kLyingBelow &&
-         fit.evidence.scatter_m <= kMostLogScatter &&
-         fit.evidence.outside_ratio <= kMostOutside &&
+         fit.evidence.scatter_m <= kMostLogScatter && fit.evidence.outside_ratio <= kMostOutside &&
          diameter_sd(fit.stem) <= kMostDiameterSd * diameter;
 }
 
@@ -424,9 +421,8 @@ std::vector<LogFit> find_logs(std::vector<SlicePoint>& points, const Raster& gro
   const auto cell_of = [](double value) { return static_cast<int>(std::floor(value / kSeedCell)); };
   for (std::size_t i = 0; i < all.size(); ++i) {
     const Eigen::Vector3d point = all.at(i);
-    const std::uint64_t place =
-        hash_numbers(static_cast<std::uint64_t>(cell_of(point.x())),
-                     static_cast<std::uint64_t>(cell_of(point.y())));
+    const std::uint64_t place = hash_numbers(static_cast<std::uint64_t>(cell_of(point.x())),
+                                             static_cast<std::uint64_t>(cell_of(point.y())));
     if (places.empty() || places.back() != place) {
       places.push_back(place);
       cells.emplace_back();
@@ -466,6 +462,8 @@ std::vector<LogFit> find_logs(std::vector<SlicePoint>& points, const Raster& gro
   return kept;
 }
 
-double log_search_reach() { return 0.5 * kLongestLog + 2.0; }
+double log_search_reach() {
+  return 0.5 * kLongestLog + 2.0;
+}
 
 }  // namespace understory

@@ -37,6 +37,14 @@ class LogScene {
       }
     }
   }
+  // Points 5 to 12 cm above the terrain.
+  void add_uneven_ground(const Eigen::Vector2d& low, const Eigen::Vector2d& high) {
+    for (int i = 0; i < 8'000; ++i) {
+      const Eigen::Vector2d place(random_.uniform(low.x(), high.x()),
+                                  random_.uniform(low.y(), high.y()));
+      add(place, 0.1 * place.x() + random_.uniform(0.05, 0.12));
+    }
+  }
   void add_plants(const Eigen::Vector2d& centre, int count) {
     for (int i = 0; i < count; ++i) {
       const Eigen::Vector2d place =
@@ -70,8 +78,8 @@ class LogScene {
     const double y = place.y() + random_.normal(0.0, 0.01);
     const double height = z + random_.normal(0.0, 0.01) - ground_.interpolate(x, y);
     if (height < 0.05) return;
-    points_.push_back({static_cast<float>(x), static_cast<float>(y),
-                       static_cast<float>(height), 1});
+    points_.push_back(
+        {static_cast<float>(x), static_cast<float>(y), static_cast<float>(height), 1});
   }
   Raster ground_;
   Random random_{7};
@@ -90,6 +98,44 @@ TEST(LogSearch, FindsALogWithItsEnds) {
   EXPECT_NEAR(log.from.z(), 0.5 + 0.12, 0.02);
   EXPECT_NEAR(log.diameter_m, 0.3, 0.02);
   EXPECT_NEAR(log.diameter_to_m, 0.2, 0.02);
+}
+
+TEST(LogSearch, BeginsAtItsThickEnd) {
+  for (const bool turned : {false, true}) {
+    const Eigen::Vector2d thick = turned ? Eigen::Vector2d(11.0, 9.0) : Eigen::Vector2d(5.0, 6.0);
+    const Eigen::Vector2d thin = turned ? Eigen::Vector2d(5.0, 6.0) : Eigen::Vector2d(11.0, 9.0);
+    LogScene scene;
+    scene.add_log(thick, thin, 0.3, 0.2, 0.12, 0.12);
+    const std::vector<LogFit> found = scene.search();
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_LT((found[0].from.head<2>() - thick).norm(), 0.1);
+    EXPECT_GT(found[0].diameter_m, found[0].diameter_to_m);
+  }
+}
+
+// Uneven ground around it does not make it longer.
+TEST(LogSearch, EndsWhereTheGroundGoesOn) {
+  LogScene scene;
+  scene.add_log({5.0, 6.0}, {10.0, 6.0}, 0.24, 0.2, 0.05, 0.05);
+  scene.add_uneven_ground({2.0, 4.0}, {13.0, 8.0});
+  const std::vector<LogFit> found = scene.search();
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_NEAR((found[0].to - found[0].from).norm(), 5.0, 1.0);
+  EXPECT_NEAR(found[0].diameter_m, 0.24, 0.04);
+}
+
+TEST(LogSearch, PointsOfListedStemsAreNone) {
+  LogScene scene;
+  scene.add_log({5.0, 6.0}, {7.5, 6.0}, 0.3, 0.3, 0.12, 0.12);
+  std::vector<StemFit> stems;
+  for (double x = 5.0; x < 7.6; x += 0.2) {
+    StemFit stem;
+    stem.centre = {x, 6.0};
+    stem.radius_m = 0.15;
+    stems.push_back(stem);
+  }
+  EXPECT_EQ(scene.search().size(), 1U);
+  EXPECT_TRUE(scene.search(stems).empty());
 }
 
 TEST(LogSearch, TwoThatCrossAreTwo) {
@@ -128,7 +174,9 @@ TEST(LogSearch, CountsWhereItsMiddleLies) {
   EXPECT_TRUE(scene.search({}, {{8.0 + 0.5, 0.0}, {20.0, 20.0}}).empty());
 }
 
-TEST(LogSearch, NothingIsFoundInNothing) { EXPECT_TRUE(LogScene().search().empty()); }
+TEST(LogSearch, NothingIsFoundInNothing) {
+  EXPECT_TRUE(LogScene().search().empty());
+}
 
 }  // namespace
 }  // namespace understory

@@ -30,7 +30,9 @@ struct SlicedCircle {
   std::size_t slice = 0;
 };
 
-double height_of(std::size_t slice) { return kSlice * (static_cast<double>(slice) + 0.5); }
+double height_of(std::size_t slice) {
+  return kSlice * (static_cast<double>(slice) + 0.5);
+}
 
 // By x of their centres.
 std::vector<SlicedCircle> circles_in(const std::vector<SlicePoint>& points,
@@ -47,8 +49,7 @@ std::vector<SlicedCircle> circles_in(const std::vector<SlicePoint>& points,
   search.min_arc_deg = kLeastArc;
   search.area = where.area;
   search.origin = where.origin;
-  const std::vector<std::vector<Circle>> found =
-      find_circles(slices, search, kStumpSeed, progress);
+  const std::vector<std::vector<Circle>> found = find_circles(slices, search, kStumpSeed, progress);
   std::vector<SlicedCircle> circles;
   for (std::size_t slice = 0; slice < found.size(); ++slice) {
     for (const Circle& circle : found[slice])
@@ -115,8 +116,8 @@ double top_of(const StemFit& start, const PointIndex& index,
   // The lowest height above which a stump's height of air holds few of them.
   for (std::size_t i = heights.size() / 2; i < heights.size(); ++i) {
     const auto top = static_cast<double>(heights[i]);
-    const auto end = std::upper_bound(heights.begin(), heights.end(),
-                                      static_cast<float>(top + kClearAbove));
+    const auto end =
+        std::upper_bound(heights.begin(), heights.end(), static_cast<float>(top + kClearAbove));
     const auto above = static_cast<double>(end - heights.begin()) - static_cast<double>(i + 1);
     if (above <= kAboveShare * static_cast<double>(i + 1)) return top;
   }
@@ -167,8 +168,7 @@ bool is_stump(const StemFitResult& fit, double top_m, const StumpSight& sight) {
   const double diameter = 2.0 * fit.stem.radius_m;
   return top_m <= kSlenderest * diameter && sight.returns >= kLeastReturns &&
          sight.arc_deg >= kLeastStumpArc && sight.inside <= kMostInside * sight.on &&
-         sight.around <= kMostAround * sight.on &&
-         fit.evidence.scatter_m <= kMostScatterStump &&
+         sight.around <= kMostAround * sight.on && fit.evidence.scatter_m <= kMostScatterStump &&
          fit.evidence.outside_ratio <= kMostOutsideStump &&
          (fit.evidence.outside_ratio <= kFewOutsideStump ||
           sight.around <= kFewAround * sight.on) &&
@@ -240,11 +240,9 @@ std::vector<StumpFit> find_stumps(std::vector<SlicePoint>& points,
     if (const std::optional<StumpFit> stump = fit_stump(stack.start, index, points))
       stumps.push_back(*stump);
   }
-  std::erase_if(stumps,
-                [&](const StumpFit& stump) { return !where.area.contains(stump.centre); });
+  std::erase_if(stumps, [&](const StumpFit& stump) { return !where.area.contains(stump.centre); });
   std::sort(stumps.begin(), stumps.end(), [](const StumpFit& a, const StumpFit& b) {
-    return a.centre.x() != b.centre.x() ? a.centre.x() < b.centre.x()
-                                        : a.centre.y() < b.centre.y();
+    return a.centre.x() != b.centre.x() ? a.centre.x() < b.centre.x() : a.centre.y() < b.centre.y();
   });
   return stumps;
 }

@@ -14,9 +14,9 @@ class StumpScene {
  public:
   // The side of an upright cylinder between two heights.
   void add_wall(const Eigen::Vector2d& centre, double radius_m, double from_m, double to_m,
-                double narrower_per_m = 0.0) {
+                double narrower_per_m = 0.0, double seen_rad = 2.0 * M_PI) {
     for (double height = from_m; height < to_m; height += 0.02) {
-      for (double angle = 0.0; angle < 2.0 * M_PI; angle += 0.02 / radius_m) {
+      for (double angle = 0.0; angle < seen_rad; angle += 0.02 / radius_m) {
         const double radius = radius_m - narrower_per_m * (height - from_m);
         add(centre.x() + radius * std::cos(angle), centre.y() + radius * std::sin(angle), height);
       }
@@ -83,6 +83,13 @@ TEST(StumpSearch, StandsOnTheGround) {
   EXPECT_TRUE(scene.search().empty());
 }
 
+// A third of it is too little to tell it from what else is round.
+TEST(StumpSearch, ShowsMoreThanOneSide) {
+  StumpScene scene;
+  scene.add_wall({3.0, 4.0}, 0.15, 0.05, 0.4, 0.0, 0.35 * M_PI);
+  EXPECT_TRUE(scene.search().empty());
+}
+
 TEST(StumpSearch, ABoulderIsNone) {
   StumpScene scene;
   scene.add_wall({3.0, 4.0}, 0.35, 0.05, 0.4, 0.8);
@@ -106,7 +113,9 @@ TEST(StumpSearch, TheFootOfAListedTreeIsNone) {
   EXPECT_TRUE(scene.search({tree}).empty());
 }
 
-TEST(StumpSearch, NothingIsFoundInNothing) { EXPECT_TRUE(StumpScene().search().empty()); }
+TEST(StumpSearch, NothingIsFoundInNothing) {
+  EXPECT_TRUE(StumpScene().search().empty());
+}
 
 }  // namespace
 }  // namespace understory

@@ -23,9 +23,8 @@ std::string row_of(std::size_t id, const DeadWood& piece, bool ned) {
        {fmt::format("{:.2f}", x), fmt::format("{:.2f}", y),
         fmt::format("{:.0f}", 100.0 * piece.diameter_m),
         fmt::format("{:.0f}", 100.0 * piece.diameter_to_m),
-        fmt::format("{:.1f}", 100.0 * piece.diameter_sd_m),
-        fmt::format("{:.1f}", piece.length_m()), fmt::format("{:.3f}", piece.volume_m3()),
-        std::to_string(piece.observations)})
+        fmt::format("{:.1f}", 100.0 * piece.diameter_sd_m), fmt::format("{:.1f}", piece.length_m()),
+        fmt::format("{:.3f}", piece.volume_m3()), std::to_string(piece.observations)})
     row += fmt::format("<td class=\"n\">{}</td>", cell);
   return "<tr>" + row + "</tr>";
 }
@@ -34,8 +33,7 @@ std::string row_of(std::size_t id, const DeadWood& piece, bool ned) {
 
 std::string dead_wood_svg(const InventoryResult& inventory, const MapView& view) {
   if (inventory.dead_wood.empty()) return "";
-  std::string svg =
-      "<g class=\"wood\" fill=\"none\" stroke=\"#8a5a2b\" stroke-linecap=\"round\">";
+  std::string svg = "<g class=\"wood\" fill=\"none\" stroke=\"#8a5a2b\" stroke-linecap=\"round\">";
   const auto out = std::back_inserter(svg);
   for (const DeadWood& piece : inventory.dead_wood) {
     const Eigen::Vector2d from = view.at(piece.from);
