@@ -6,7 +6,7 @@
   ./run accuracy --flights --seconds 60           only the first minute
   ./run accuracy --flights --write                puts the table into docs/method/odometry.md
 
-Errors after one motion in space (SE(3)): APE, RPE over 10 m, velocity along each axis. Beside them the errors
+Flights are mapped by the profile `uav`. Errors after one motion in space (SE(3)): APE, RPE over 10 m, velocity along each axis. Beside them the errors
 as the run lies on the globe: each pose is taken to the site's origin by the place that run.json tells. A run
 that knows no place has none. Recordings are simulated once for all runs of a site and a seed. What was measured
 is kept (`--keep`), so that a table that was stopped goes on where it was. Needs numpy.
@@ -75,7 +75,7 @@ def recorded(work, site, seed, seconds, cut):
 
 def measured(work, recording, name, settings):
     run, truth = work / name, recording.with_suffix(".truth")
-    told = map_recording(recording, run, settings=("map.enabled=false", *settings))
+    told = map_recording(recording, run, settings=("map.enabled=false", *settings), more=("--profile", "uav"))
     errors = understory_json("evaluate", run, truth, "--align", "se3")
     return {"ape": errors["ape_rmse_m"], "rpe": errors["rpe"][0]["translation_rmse_m"],
             "velocity": errors.get("velocity_rmse_m_s"), "globe": on_globe(run, truth, told),

@@ -109,6 +109,10 @@ inline constexpr int kLeastSteps = 10;
 inline constexpr double kLeastNear = 0.4;
 // m: radii that a fit starts with [chosen]
 inline constexpr double kFirstRadii[] = {0.05, 0.09, 0.15, 0.25};
+// m from the line: points that the first fit sees [chosen]
+inline constexpr double kFirstReach = 0.5;
+// Weight of a point within a first fit against one on it [chosen]
+inline constexpr double kInsideWeight = 2.0;
 // m: thickest log [chosen]
 inline constexpr double kThickestRadius = 0.4;
 // m from the surface: points on it [chosen]

@@ -93,9 +93,6 @@ inline constexpr std::size_t kMostEvents = 500'000;
 }  // namespace sensor_traits
 
 namespace adaptation {  // pipeline/mapping/adaptation.cc
-// m: preprocess.voxel.voxel_size_m of a sparse lidar [chosen: maps by the sleigh had been 0.2 %
-// too small]
-inline constexpr double kSparseVoxelM = 0.1;
 // m: keyframe.distance_m of a sparse lidar [chosen]
 inline constexpr double kSparseKeyframeM = 0.3;
 // keyframe.below_found_share of a sparse lidar [chosen: in good runs no scan finds less than 0.8 of

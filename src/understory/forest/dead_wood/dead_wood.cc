@@ -44,6 +44,7 @@ std::vector<DeadWood> stumps_in(const DeadWoodTask& task, const TileShelf<SliceP
     piece.kind = DeadWoodKind::kStump;
     piece.from.head<2>() = task.origin.head<2>() + stump.centre;
     piece.from.z() = task.ground.interpolate(piece.from.x(), piece.from.y());
+    if (std::isnan(piece.from.z())) continue;
     piece.to.head<2>() = task.origin.head<2>() + stump.top;
     piece.to.z() = piece.from.z() + stump.height_m;
     piece.diameter_m = stump.diameter_m;

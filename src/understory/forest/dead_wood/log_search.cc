@@ -2,9 +2,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "understory/forest/dead_wood_constants.h"
 #include "understory/forest/stems/arc_bins.h"
@@ -29,12 +32,7 @@ struct Piece {
   double taper = 0.0;     // of the radius, per metre along
 };
 
-struct GroundedPoint {
-  Eigen::Vector3d place;
-  double height_m = 0.0;
-  std::uint32_t returns = 0;
-};
-
+// The points with their heights in the frame of the search, by place.
 class Points {
  public:
   Points(std::vector<SlicePoint>& points, const Raster& ground) : points_(points), index_(points) {
@@ -167,7 +165,7 @@ Piece piece_of(const Piece& before, const Eigen::Matrix3d& frame, const StemFit&
 // The first cylinder about a line through its surface.
 std::optional<Piece> first_fit(const Points& points, const Piece& line) {
   const Eigen::Matrix3d frame = upright_frame(line.along);
-  const std::vector<SlicePoint> laid = on_end(points, line, frame, 0.5);
+  const std::vector<SlicePoint> laid = on_end(points, line, frame, kFirstReach);
   std::optional<Piece> best;
   double most = 0.0;
   const StemDetectorConfig config;
@@ -177,7 +175,7 @@ std::optional<Piece> first_fit(const Points& points, const Piece& line) {
     start.radius_m = radius;
     const StemFitResult fit = fit_stem(laid, start, config);
     if (!fit.converged || fit.stem.radius_m > kThickestRadius) continue;
-    const double score = fit.evidence.on - 2.0 * fit.evidence.inside;
+    const double score = fit.evidence.on - kInsideWeight * fit.evidence.inside;
     if (score <= most) continue;
     most = score;
     best = piece_of(line, frame, fit.stem);
@@ -391,9 +389,13 @@ bool of_a_stem(const SlicePoint& point, const StemFit& stem) {
   return off.norm() < stem.radius_m + kStemMargin;
 }
 
-void drop_stems(std::vector<SlicePoint>& points, const std::vector<StemFit>& stems) {
-  std::erase_if(points, [](const SlicePoint& point) {
-    return static_cast<double>(point.height_m) > kHighestLog;
+// Leaves what may be of a log. A thinned point may lie where the terrain ends.
+void drop_others(std::vector<SlicePoint>& points, const Raster& ground,
+                 const std::vector<StemFit>& stems) {
+  std::erase_if(points, [&](const SlicePoint& point) {
+    return static_cast<double>(point.height_m) > kHighestLog ||
+           std::isnan(
+               ground.interpolate(static_cast<double>(point.x), static_cast<double>(point.y)));
   });
   const PointIndex index(points);
   std::vector<char> taken(points.size(), 0);
@@ -414,7 +416,7 @@ void drop_stems(std::vector<SlicePoint>& points, const std::vector<StemFit>& ste
 std::vector<LogFit> find_logs(std::vector<SlicePoint>& points, const Raster& ground,
                               const std::vector<StemFit>& stems, const GroundArea& area,
                               const ProgressSink& progress) {
-  drop_stems(points, stems);
+  drop_others(points, ground, stems);
   const Points all(points, ground);
   std::vector<std::vector<std::size_t>> cells;
   std::vector<std::uint64_t> places;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "understory/util/random.h"
@@ -37,6 +38,7 @@ class LogScene {
       }
     }
   }
+  void forget_ground() { std::fill(ground_.values.begin(), ground_.values.end(), std::nanf("")); }
   // Points 5 to 12 cm above the terrain.
   void add_uneven_ground(const Eigen::Vector2d& low, const Eigen::Vector2d& high) {
     for (int i = 0; i < 8'000; ++i) {
@@ -172,6 +174,14 @@ TEST(LogSearch, CountsWhereItsMiddleLies) {
   scene.add_log({5.0, 6.0}, {11.0, 9.0}, 0.3, 0.2, 0.12, 0.12);
   EXPECT_EQ(scene.search({}, {{8.0 - 0.5, 0.0}, {20.0, 20.0}}).size(), 1U);
   EXPECT_TRUE(scene.search({}, {{8.0 + 0.5, 0.0}, {20.0, 20.0}}).empty());
+}
+
+TEST(LogSearch, PointsBesideTheTerrainAreLeftOut) {
+  LogScene scene;
+  scene.add_log({5.0, 6.0}, {11.0, 9.0}, 0.3, 0.2, 0.12, 0.12);
+  EXPECT_EQ(scene.search().size(), 1U);
+  scene.forget_ground();
+  EXPECT_TRUE(scene.search().empty());
 }
 
 TEST(LogSearch, NothingIsFoundInNothing) {

@@ -59,7 +59,7 @@ void suit_sparse_scans(const DenseMappingConfig& config, const SensorTraits& tra
   const std::string why =
       fmt::format("sparse scans: {} points, fewer than run.sparse_scan_points", traits.scan_points);
   changes.at_most("preprocess.voxel.voxel_size_m", config.odometry.voxel.voxel_size_m,
-                  kSparseVoxelM, why);
+                  config.sparse_voxel_m, why);
   changes.at_most("registration.min_inlier_ratio", config.odometry.match.min_inlier_ratio,
                   kSparseInlierRatio, why);
   changes.at_most("keyframe.distance_m", config.keyframe_map.keyframe.distance_m, kSparseKeyframeM,

@@ -127,6 +127,14 @@ TEST(Adaptation, WhatAProfileSetStays) {
   EXPECT_EQ(adapted.config.keyframe_map.keyframe.distance_m, 0.2);
 }
 
+TEST(Adaptation, AFlightThinsSparseScansMore) {
+  const ReadConfig<DenseMappingConfig> read = read_dense_mapping_config("uav", "", {});
+  const auto sparse = adapt(read.config, read.origins, sixteen_rings(), {});
+  EXPECT_EQ(sparse.config.odometry.voxel.voxel_size_m, 0.2);
+  const auto dense = adapt(read.config, read.origins, many_rings(), {});
+  EXPECT_EQ(dense.config.odometry.voxel.voxel_size_m, 0.4);
+}
+
 TEST(Adaptation, AnUnknownLidarAndAThresholdOfNothingChangeNothing) {
   SensorTraits unknown;
   unknown.has_imu = true;

@@ -67,6 +67,8 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
               "of recording between checkpoints");
     table.add("sparse_scan_points", config.sparse_scan_points, {0, 100000000}, "points",
               "with fewer points in a full scan, settings are adapted to a sparse lidar; 0: never");
+    table.add("sparse_voxel_m", config.sparse_voxel_m, {0.01, 10.0}, "m",
+              "preprocess.voxel.voxel_size_m of a sparse lidar, unless that key is set");
     table.add("lost_after_scans", config.lost_after_scans, {1, 100000}, "scans",
               "unmatched scans in a row after which a new piece of map begins");
     table.add("max_memory_mb", config.max_memory_mb, {0.0, 1e6}, "MB",

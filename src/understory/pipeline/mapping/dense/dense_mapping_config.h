@@ -56,6 +56,9 @@ struct DenseMappingConfig {
   // nobody set them (adapt()). Thinned like dense scans, its scans would leave too few points in a
   // cell.
   int sparse_scan_points = 60000;
+  // Of these, preprocess.voxel.voxel_size_m. Maps by the sleigh had been 0.2 % too small with 0.4
+  // m.
+  double sparse_voxel_m = 0.1;
   int lost_after_scans = 30;   // unmatched scans in a row after which a new segment begins
   double max_memory_mb = 0.0;  // resident, MB of 10^6 bytes; 0: no limit
   // What follows from it (memory_plan.h), no setting of its own: bytes that the inventory of the
