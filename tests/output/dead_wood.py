@@ -83,6 +83,9 @@ def main():
         thick = rows(folder / "thick/dead_wood.csv")
         assert 0 < len(thick) < len(listed) and all(number(row["diameter_m"]) >= 0.249 or number(row["diameter_to_m"]) >= 0.249
                                                     for row in thick)
+        # Where no tree is listed, as on a clear-cut.
+        run("inventory", folder / "run", "-o", folder / "bare", "--set", "stems.min_dbh_m=1.2")
+        assert not rows(folder / "bare/trees.csv") and len(rows(folder / "bare/dead_wood.csv")) > 10
         run("inventory", folder / "run/map.laz", "-o", folder / "basic", "--set", "extent=basic")
         assert not (folder / "basic/dead_wood.csv").exists()
 

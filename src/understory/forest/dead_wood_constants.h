@@ -131,7 +131,7 @@ inline constexpr double kLongestGap = 0.8;
 inline constexpr double kPiece = 0.2;
 // m: shorter ones are branches [chosen]
 inline constexpr double kShortestLog = 1.5;
-// m: longer ones are cut [bound: reach]
+// m: what is longer is none, as of what lies beyond the tile no more is seen [bound: reach]
 inline constexpr double kLongestLog = 40.0;
 // Pieces that hold points, of all [chosen]
 inline constexpr double kLeastCovered = 0.75;

@@ -82,7 +82,9 @@ struct InventoryResult {
   // Instead of the owners where the cloud lies in several tiles; not without the cloud.
   std::shared_ptr<OwnerTiles> owner_tiles;
   std::optional<CanopyCrowns> crowns;  // where trees were found by them
-  std::vector<DeadWood> dead_wood;     // of a full inventory: stumps, then lying stems
+  // Of a full inventory, also where no tree stands: stumps, then lying stems. Nothing: not
+  // searched.
+  std::optional<std::vector<DeadWood>> dead_wood;
   std::vector<int> crown_ids;  // id of the tree of each crown, 0 where it is none of the list
   // The thinned points between 0.5 m and 3.5 m that were searched; of a cloud in several tiles some
   // of those near breast height.

@@ -9,10 +9,10 @@ namespace understory {
 
 void write_tree_tables(const std::filesystem::path& folder, const InventoryResult& inventory) {
   write_trees_csv(folder / "trees.csv", inventory.trees);
+  if (inventory.dead_wood) write_dead_wood(folder / "dead_wood.csv", *inventory.dead_wood);
   if (inventory.curves.empty()) return;
   write_stem_curves(folder / "stem_curves.csv", inventory.trees, inventory.curves,
                     inventory.origin.head<2>());
-  write_dead_wood(folder / "dead_wood.csv", inventory.dead_wood);
 }
 
 void write_inventory_files(const std::filesystem::path& folder, const InventoryResult& inventory,
@@ -22,7 +22,7 @@ void write_inventory_files(const std::filesystem::path& folder, const InventoryR
   layers.look_again = looks_in(LayerFrame(), inventory.look_again);
   layers.plots = plots;
   layers.crowns = crown_outlines(inventory);
-  layers.dead_wood = dead_wood_in(LayerFrame(), inventory.dead_wood);
+  layers.dead_wood = dead_wood_in(LayerFrame(), inventory);
   write_trees_gpkg(folder / "trees.gpkg", inventory.trees, crs, layers);
   if (!inventory.ground.terrain.empty()) {
     write_geotiff(folder / "dtm.tif", inventory.ground.terrain, crs);

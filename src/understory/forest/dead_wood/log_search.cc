@@ -324,8 +324,10 @@ double diameter_sd(const StemFit& fit) {
 
 bool is_log(const StemFitResult& fit, const Piece& piece, const LogSight& sight) {
   const double diameter = 2.0 * piece.radius_m;
+  const double thin_end =
+      2.0 * (piece.radius_m + std::min(piece.taper * piece.low_m, piece.taper * piece.high_m));
   return piece.high_m - piece.low_m >= std::max(kShortestLog, kLeastSlender * diameter) &&
-         sight.arc_deg >= kLeastLogArc && sight.round_share >= kRoundShare &&
+         thin_end > 0.0 && sight.arc_deg >= kLeastLogArc && sight.round_share >= kRoundShare &&
          sight.inside <= kMostInsideLog * sight.on && sight.lowest_m <= kLyingBelow &&
          fit.evidence.scatter_m <= kMostLogScatter && fit.evidence.outside_ratio <= kMostOutside &&
          diameter_sd(fit.stem) <= kMostDiameterSd * diameter;

@@ -95,9 +95,10 @@ std::vector<LookPoint> looks_in(const LayerFrame& layers, const std::vector<Look
   return looks;
 }
 
-std::vector<DrawnWood> dead_wood_in(const LayerFrame& layers, const std::vector<DeadWood>& pieces) {
+std::vector<DrawnWood> dead_wood_in(const LayerFrame& layers, const InventoryResult& inventory) {
   std::vector<DrawnWood> drawn;
-  for (const DeadWood& piece : pieces)
+  if (!inventory.dead_wood) return drawn;
+  for (const DeadWood& piece : *inventory.dead_wood)
     drawn.push_back({piece, layers.from_world(piece.from), layers.from_world(piece.to)});
   return drawn;
 }
@@ -148,7 +149,7 @@ void write_tree_layers(const std::filesystem::path& folder, const InventoryResul
   drawn.path = path_in(layers, path);
   drawn.look_again = looks_in(layers, inventory.look_again);
   drawn.plots = plots;
-  drawn.dead_wood = dead_wood_in(layers, inventory.dead_wood);
+  drawn.dead_wood = dead_wood_in(layers, inventory);
   drawn.crowns = crowns_in(layers, crown_outlines(inventory), inventory.trees);
   drawn.heights = layers.heights();
   write_trees_gpkg(folder / "trees.gpkg", trees_in(layers, inventory.trees), layers.wkt(), drawn);

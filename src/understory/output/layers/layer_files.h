@@ -34,7 +34,7 @@ void ask_for_copc(LasOptions& options, Log& log);
 
 // Stumps and lying stems with their ends in the frame of the layers.
 [[nodiscard]] std::vector<DrawnWood> dead_wood_in(const LayerFrame& layers,
-                                                  const std::vector<DeadWood>& pieces);
+                                                  const InventoryResult& inventory);
 // Places to look from again, in the frame of the layers.
 [[nodiscard]] std::vector<LookPoint> looks_in(const LayerFrame& layers,
                                               const std::vector<LookAgain>& places);

@@ -110,6 +110,50 @@ TEST(MovedVectors, PlotsAndPlacesGoWithTheRun) {
   EXPECT_EQ(plot->GetFieldAsDouble("trees"), 12.0);
 }
 
+TEST(MovedVectors, DeadWoodGoesWithTheRun) {
+  PlacedRun run;
+  const auto& [motion, layers, folders] = run;
+  DeadWood stump;
+  stump.kind = DeadWoodKind::kStump;
+  stump.from = {4.0, 3.0, 2.0};
+  stump.to = {4.0, 3.0, 2.5};
+  DeadWood log;
+  log.from = {1.0, 2.0, 3.0};
+  log.to = {7.0, -2.0, 3.5};
+  log.diameter_m = 0.3;
+  InventoryResult inventory;
+  inventory.trees = {tree_at_height(2.0)};
+  inventory.dead_wood = {stump, log};
+  const GDALDatasetUniquePtr dataset = run.package_of(inventory, {});
+  ASSERT_NE(dataset, nullptr);
+  const auto expect_at = [&](const OGRPoint& point, const Vector3d& world) {
+    EXPECT_LT((Vector3d(point.getX(), point.getY(), point.getZ()) -
+               layers.exact_from_world(motion * world))
+                  .norm(),
+              1e-3);
+  };
+  for (const auto& [name, id] : {std::pair{"stumps", 1}, std::pair{"logs", 2}}) {
+    OGRLayer* layer = dataset->GetLayerByName(name);
+    ASSERT_NE(layer, nullptr) << name;
+    const OGRFeatureUniquePtr row(layer->GetNextFeature());
+    ASSERT_NE(row, nullptr);
+    EXPECT_EQ(row->GetFieldAsInteger("id"), id);
+    if (id == 1) {
+      expect_at(*row->GetGeometryRef()->toPoint(), stump.from);
+      EXPECT_NEAR(row->GetFieldAsDouble("height_m"), 0.5, 1e-9);
+      continue;
+    }
+    const OGRLineString& line = *row->GetGeometryRef()->toLineString();
+    ASSERT_EQ(line.getNumPoints(), 2);
+    OGRPoint end;
+    line.getPoint(0, &end);
+    expect_at(end, log.from);
+    line.getPoint(1, &end);
+    expect_at(end, log.to);
+    EXPECT_NEAR(row->GetFieldAsDouble("length_m"), log.length_m(), 1e-9);
+  }
+}
+
 TEST(MovedVectors, CrownsGoWithTheRun) {
   PlacedRun run;
   const auto& [motion, layers, folders] = run;

@@ -32,10 +32,10 @@ std::string row_of(std::size_t id, const DeadWood& piece, bool ned) {
 }  // namespace
 
 std::string dead_wood_svg(const InventoryResult& inventory, const MapView& view) {
-  if (inventory.dead_wood.empty()) return "";
+  if (!inventory.dead_wood || inventory.dead_wood->empty()) return "";
   std::string svg = "<g class=\"wood\" fill=\"none\" stroke=\"#8a5a2b\" stroke-linecap=\"round\">";
   const auto out = std::back_inserter(svg);
-  for (const DeadWood& piece : inventory.dead_wood) {
+  for (const DeadWood& piece : *inventory.dead_wood) {
     const Eigen::Vector2d from = view.at(piece.from);
     if (piece.kind == DeadWoodKind::kStump) {
       fmt::format_to(out, "<path stroke-width=\"1.5\" d=\"M{0:.1f} {1:.1f}h{2}v{2}h-{2}z\"/>",
@@ -51,8 +51,8 @@ std::string dead_wood_svg(const InventoryResult& inventory, const MapView& view)
 }
 
 std::string dead_wood_part(const InventoryResult& inventory, WorldFrame world_frame) {
-  const std::vector<DeadWood>& pieces = inventory.dead_wood;
-  if (pieces.empty()) return "";
+  if (!inventory.dead_wood || inventory.dead_wood->empty()) return "";
+  const std::vector<DeadWood>& pieces = *inventory.dead_wood;
   std::size_t stumps = 0;
   double volume_m3 = 0.0;
   for (const DeadWood& piece : pieces) {

@@ -305,7 +305,8 @@ std::string map_legend(const ReportInput& input) {
     entry(" class=\"box\"", "background:#4f9a4a", "vegetation, the lighter the higher");
   }
   legend += tree_legend(input);
-  if (input.inventory != nullptr && !input.inventory->dead_wood.empty()) {
+  if (input.inventory != nullptr && input.inventory->dead_wood &&
+      !input.inventory->dead_wood->empty()) {
     entry(" class=\"box\"", "border:2px solid #8a5a2b", "stump");
     entry("", "border-color:#8a5a2b", "lying stem");
   }

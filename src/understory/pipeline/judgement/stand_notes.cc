@@ -85,8 +85,7 @@ void note_doubts(const InventoryResult& inventory, RunSummary& summary) {
   count("trees_by_crown", doubts.by_crown);
   count("look_again_places", inventory.look_again.size());
   count("look_again_trees", trees_at(inventory.look_again));
-  const bool full = !inventory.curves.empty() || !inventory.dead_wood.empty();
-  if (full) note_dead_wood(inventory.dead_wood, summary);
+  if (inventory.dead_wood) note_dead_wood(*inventory.dead_wood, summary);
   summary.quality["thin_coverage_share"] = inventory.thin.share;
 }
 
