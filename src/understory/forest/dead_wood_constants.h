@@ -9,7 +9,8 @@ namespace understory::forest_constants {
 namespace dead_wood {  // forest/dead_wood/dead_wood.cc
 // m above the terrain: lower points are ground ... [chosen]
 inline constexpr double kLowest = 0.05;
-// ... and the highest that decide whether a stump ends [chosen: a metre above the highest stump]
+// ... and the highest that decide whether a stump ends [bound: the highest one, and 0.8 m that are
+// empty]
 inline constexpr double kHighestLow = 2.3;
 // m: edge of a cube with one point [chosen: the noise of a scanner]
 inline constexpr double kCube = 0.02;

@@ -261,6 +261,13 @@ inline constexpr double kGhosts = 4.0;
 inline constexpr double kScannerHeight = 1.5;
 // Places of the scanner that a top is looked at from, about [bound: time]
 inline constexpr std::size_t kMostLookouts = 64;
+// m of a stem that ends low, and of what is above its end [bound: those that are counted]
+inline constexpr double kHalfMetre = 0.5;
+// m around it in which things may hide what is above its end [chosen]
+inline constexpr double kHidesWithin = 10.0;
+// Points that the half metre above its end would show, did it go on: with more it ends there
+// [chosen: sight lines are rough, and by chance 40 are there]
+inline constexpr double kSureExpected = 40.0;
 }  // namespace top_judgement
 
 namespace sight_lines {  // forest/trees/occupied_space.cc

@@ -441,6 +441,8 @@ InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& c
   result.points = gathered.points;
   result.slices = std::move(gathered.slices);
   result.stems = std::move(gathered.stems);
+  drop_low_ends(SlicesNear(result.slices, gathered.thinned, cloud, result.origin), config.stems,
+                lookouts, result);
   take_section_radii(result);
   compensate_beams(config.beam, scanner, result);
   result.thin = gathered.coverage.thin();

@@ -8,6 +8,7 @@
 
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/inventory.h"
+#include "understory/forest/stems/not_a_tree.h"
 #include "understory/forest/trees/occupied_space.h"
 #include "understory/forest/trees/tree_heights.h"
 #include "understory/forest/trees/view_limit.h"
@@ -121,7 +122,38 @@ std::vector<TopView> likely_top_views(const StemTops& tops,
   return views;
 }
 
+// Whether the stem ends where it was seen to end.
+bool is_seen_to_end_low(const StemFit& stem, const SlicesNear& slices,
+                        const StemDetectorConfig& config, const Lookouts& lookouts,
+                        const InventoryResult& result) {
+  if (stem.in_foliage || stem.highest_m > config.highest_m - kHalfMetre) return false;
+  const PointsNear near = [&](const Eigen::Vector2d& centre, double reach,
+                              const std::function<void(const SlicePoint&)>& visit) {
+    slices.visit(GroundArea{centre, centre}.grown(reach), visit);
+  };
+  const int below = points_before_sudden_end(stem, near, config);
+  if (below == 0) return false;
+  OccupiedSpace space;
+  slices.visit(GroundArea{stem.centre, stem.centre}.grown(kHidesWithin),
+               [&](const SlicePoint& point) {
+                 space.add({static_cast<double>(point.x), static_cast<double>(point.y)},
+                           static_cast<double>(point.height_m));
+               });
+  const SightLines sight(space);
+  const double seen = view_at(sight, result, stem, stem.highest_m - 0.5 * kHalfMetre, lookouts);
+  const double above = view_at(sight, result, stem, stem.highest_m + kHalfMetre, lookouts);
+  return seen > 0.0 && below * above / seen >= kSureExpected;
+}
+
 }  // namespace
+
+void drop_low_ends(const SlicesNear& slices, const StemDetectorConfig& config,
+                   const Lookouts& lookouts, InventoryResult& result) {
+  if (!lookouts) return;
+  std::erase_if(result.stems, [&](const StemFit& stem) {
+    return is_seen_to_end_low(stem, slices, config, lookouts, result);
+  });
+}
 
 double listed_height(const InventoryResult& result, const StemFit& stem, double top_m,
                      const Lookouts& lookouts) {

@@ -4,7 +4,9 @@
 #include <functional>
 #include <vector>
 
+#include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/tiles/crown_tiles.h"
+#include "understory/forest/tiles/stem_tiles.h"
 
 namespace understory {
 
@@ -17,6 +19,13 @@ using Lookouts = std::function<std::vector<Eigen::Vector3d>(const Eigen::Vector3
 // The height of a stem's top as it is listed: NaN where the tree may go on above the view.
 [[nodiscard]] double listed_height(const InventoryResult& result, const StemFit& stem, double top_m,
                                    const Lookouts& lookouts);
+
+// Takes posts and people that stand alone out of `result.stems`. They end suddenly below 2.3 m. The
+// half metre above their end would show 40 points of a stem that went on; what stands within 10 m
+// hides a part of them. The search for stems drops those by itself that have something near them or
+// behind them.
+void drop_low_ends(const SlicesNear& slices, const StemDetectorConfig& config,
+                   const Lookouts& lookouts, InventoryResult& result);
 
 // Says how sure the heights of `result.trees` are, and which are lower bounds:
 // Where the view is known (`lookouts`):

@@ -271,7 +271,6 @@ std::optional<Piece> grown(const Points& points, Piece piece) {
     const Eigen::Matrix3d frame = upright_frame(piece.along);
     StemFit start;
     start.radius_m = piece.radius_m;
-    start.taper = piece.taper;
     const StemFitResult fit =
         fit_stem(on_end(points, piece, frame, piece.radius_m + 0.15), start, config);
     if (!fit.converged || fit.stem.radius_m > kThickestRadius) return std::nullopt;
@@ -354,7 +353,6 @@ std::optional<LogFit> judged(const Points& points, Piece piece) {
   const Eigen::Matrix3d frame = upright_frame(piece.along);
   StemFit start;
   start.radius_m = piece.radius_m;
-  start.taper = piece.taper;
   const StemFitResult fit = fit_stem(on_end(points, piece, frame, piece.radius_m + kFitReach),
                                      start, StemDetectorConfig());
   if (!fit.converged) return std::nullopt;

@@ -195,8 +195,8 @@ std::vector<FittedSection> without_outliers(const std::vector<FittedSection>& ri
   return kept;
 }
 
-// The smooth curve through the sections: their ratio to the form, a weighted line through the
-// sections around each height. Beyond the last section the ratio goes on unchanged.
+// The smooth curve through the sections: at each height the mean of their ratios to the form, near
+// ones with more weight. Beyond the last section the ratio goes on unchanged.
 class SmoothCurve {
  public:
   SmoothCurve(const std::vector<FittedSection>& rings, const Form& form, const StemFit& stem)

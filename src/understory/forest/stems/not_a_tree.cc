@@ -98,13 +98,18 @@ AtEnd look_at_end(const StemFit& stem, const StemAxis& axis, const PointsNear& n
   return end;
 }
 
+bool may_end_low(const StemFit& stem, const StemDetectorConfig& config) {
+  return !stem.in_foliage && stem.highest_m <= kLowEnd &&
+         config.highest_m >= stem.highest_m + kAboveEnd + kLeastSpan;
+}
+
 // A post ends suddenly: its last half metre is well seen, the next one is empty, and things behind
 // it were seen through that. Branches may hang above. A stem that leaves the view shows ever fewer
 // points before. Young trees within foliage do end low.
 bool ends_suddenly(const StemFit& stem, const PointsNear& near, const StemDetectorConfig& config) {
   const double from = stem.highest_m + kAboveEnd;
   const double to = from + kLeastSpan;
-  if (stem.in_foliage || stem.highest_m > kLowEnd || config.highest_m < to) return false;
+  if (!may_end_low(stem, config)) return false;
   const StemAxis axis(stem);
   const AtEnd end = look_at_end(stem, axis, near);
   if (!end.is_sudden()) return false;
@@ -208,6 +213,13 @@ TreeDoubt doubt_of(const StemFit& stem, const PointsNear& near, const StemDetect
   if (ends_low(stem, near, config) || ends_suddenly(stem, near, config)) return TreeDoubt::kEndsLow;
   if (part_of_plane(stem, near)) return TreeDoubt::kPartOfPlane;
   return TreeDoubt::kNone;
+}
+
+int points_before_sudden_end(const StemFit& stem, const PointsNear& near,
+                             const StemDetectorConfig& config) {
+  if (!may_end_low(stem, config)) return 0;
+  const AtEnd end = look_at_end(stem, StemAxis(stem), near);
+  return end.is_sudden() ? end.below : 0;
 }
 
 }  // namespace understory

@@ -28,4 +28,10 @@ using PointsNear = std::function<void(const Eigen::Vector2d& centre, double reac
 [[nodiscard]] TreeDoubt doubt_of(const StemFit& stem, const PointsNear& near,
                                  const StemDetectorConfig& config);
 
+// A stem that ends suddenly below 2.3 m with nothing above its end: how many points it has in its
+// last half metre. A stem that went on would show as many in the next one, were that as well in
+// view. 0: it goes on, ends gradually, within foliage or higher up. `near` as above.
+[[nodiscard]] int points_before_sudden_end(const StemFit& stem, const PointsNear& near,
+                                           const StemDetectorConfig& config);
+
 }  // namespace understory

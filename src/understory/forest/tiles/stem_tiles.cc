@@ -212,6 +212,18 @@ std::vector<SlicePoint> SlicesNear::in(const GroundArea& area) const {
   return thinned_ ? points_in(*thinned_, cloud_, origin_, area) : whole_;
 }
 
+void SlicesNear::visit(const GroundArea& area,
+                       const std::function<void(const SlicePoint&)>& visitor) const {
+  const auto visit_those_of = [&](const std::vector<SlicePoint>& points) {
+    for (const SlicePoint& point : points) {
+      if (area.contains({static_cast<double>(point.x), static_cast<double>(point.y)}))
+        visitor(point);
+    }
+  };
+  if (thinned_) return visit_those_of(points_in(*thinned_, cloud_, origin_, area));
+  visit_those_of(whole_);
+}
+
 StemHarvest find_stems(const TiledCloud& cloud, const GroundModel& ground,
                        const Eigen::Vector3d& origin, const StemDetectorConfig& config,
                        const ProgressSink& progress) {

@@ -41,6 +41,8 @@ class SlicesNear {
       : whole_(whole), thinned_(thinned), cloud_(cloud), origin_(origin) {}
   // Those in an area; of a cloud in one piece all.
   [[nodiscard]] std::vector<SlicePoint> in(const GroundArea& area) const;
+  // Calls the visitor for each of those in an area, and only for them.
+  void visit(const GroundArea& area, const std::function<void(const SlicePoint&)>& visitor) const;
 
  private:
   const std::vector<SlicePoint>& whole_;
