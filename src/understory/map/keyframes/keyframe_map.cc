@@ -389,15 +389,24 @@ void KeyframeMap::set_poses(const std::vector<Pose>& world_from_keyframe) {
     keyframes_[i].world_from_body = world_from_keyframe[i];
 }
 
-void KeyframeMap::move_world(const Pose& new_world_from_old_world) {
+std::optional<Pose> KeyframeMap::level(const Pose& turn, const Pose& world_from_body) {
   // What a running search finds refers to the world as it was. Its loops are kept for the next
   // optimisation, its poses are not.
   static_cast<void>(loops_.take(keyframes_.size(), true, true));
-  moved_ = true;
-  for (Keyframe& keyframe : keyframes_) {
-    keyframe.world_from_body = new_world_from_old_world * keyframe.world_from_body;
+  std::optional<Pose> back;
+  const std::size_t first = segment_start();
+  if (first > 0) {
+    const Eigen::Vector3d pivot = first < keyframes_.size()
+                                      ? keyframes_[first].world_from_body.translation()
+                                      : turn.inverse() * world_from_body.translation();
+    back = Pose(Eigen::Quaterniond::Identity(), pivot - turn * pivot);
   }
+  moved_ = true;
+  const Pose moved = back ? *back * turn : turn;
+  for (std::size_t i = first; i < keyframes_.size(); ++i)
+    keyframes_[i].world_from_body = moved * keyframes_[i].world_from_body;
   if (snapshot_ != nullptr) rebuild_local_map();
+  return back;
 }
 
 void KeyframeMap::sync() {

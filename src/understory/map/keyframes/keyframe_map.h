@@ -121,8 +121,12 @@ class KeyframeMap {
   [[nodiscard]] std::vector<char> graph_loops_used() const;
   // Of the finished map: new poses of all keyframes.
   void set_poses(const std::vector<Pose>& world_from_keyframe);
-  // Moves everything, e.g. to level the world.
-  void move_world(const Pose& new_world_from_old_world);
+  // Levels the piece that is being mapped: `turn` is a rotation about the origin of the world. The
+  // first piece turns about it. A later one turns about its first keyframe, or without any about
+  // the body. The pieces before stay where they are, as they were levelled themselves.
+  // `world_from_body`: of the body, turned already. Gives what moves the present after that turn,
+  // if anything does.
+  [[nodiscard]] std::optional<Pose> level(const Pose& turn, const Pose& world_from_body);
 
   // Null while it is empty.
   [[nodiscard]] const MatchTargetPtr& local_map() const { return snapshot_; }

@@ -87,6 +87,46 @@ TEST(KeyframeChoice, ABadMatchBecomesNoneWhereAsked) {
   EXPECT_TRUE(begun.map.wants(offer));
 }
 
+// The first piece is level, and a second one begins 10 m on, tilted.
+TEST(KeyframeLevel, TurnsThePieceThatIsMappedAboutItsFirstKeyframe) {
+  Begun begun({});
+  KeyframeMap& map = begun.map;
+  (void)map.add(kNsPerSecond, offer_at(1.0), some_points());
+  map.start_segment();
+  const Pose turn(so3_exp({0.0, 0.1, 0.0}), Eigen::Vector3d::Zero());
+  const Pose before_keyframes = turn * offer_at(9.0).world_from_body;
+  const std::optional<Pose> held = map.level(turn, before_keyframes);
+  ASSERT_TRUE(held);
+  EXPECT_LT(((*held * before_keyframes).translation() - Eigen::Vector3d(9.0, 0.0, 0.0)).norm(),
+            1e-12);
+
+  (void)map.add(2 * kNsPerSecond, offer_at(10.0), some_points());
+  (void)map.add(3 * kNsPerSecond, offer_at(12.0), some_points());
+  const Pose body = turn * offer_at(13.0).world_from_body;
+  const std::optional<Pose> back = map.level(turn, body);
+  ASSERT_TRUE(back);
+  const std::vector<Keyframe>& keyframes = map.keyframes();
+  EXPECT_EQ(keyframes[0].world_from_body.angle(), 0.0);
+  EXPECT_EQ(keyframes[1].world_from_body.translation(), Eigen::Vector3d(1.0, 0.0, 0.0));
+  const Eigen::Vector3d first(10.0, 0.0, 0.0);
+  EXPECT_LT((keyframes[2].world_from_body.translation() - first).norm(), 1e-12);
+  EXPECT_NEAR(keyframes[2].world_from_body.angle(), 0.1, 1e-9);
+  const Eigen::Vector3d along = turn * Eigen::Vector3d(1.0, 0.0, 0.0);
+  EXPECT_LT((keyframes[3].world_from_body.translation() - first - 2.0 * along).norm(), 1e-12);
+  EXPECT_LT(((*back * body).translation() - first - 3.0 * along).norm(), 1e-12);
+}
+
+TEST(KeyframeLevel, TurnsTheOnlyPieceAboutTheOriginOfTheWorld) {
+  Begun begun({});
+  (void)begun.map.add(kNsPerSecond, offer_at(1.0), some_points());
+  const Pose turn(so3_exp({0.0, 0.1, 0.0}), Eigen::Vector3d::Zero());
+  EXPECT_FALSE(begun.map.level(turn, turn * offer_at(1.5).world_from_body));
+  EXPECT_LT((begun.map.keyframes()[1].world_from_body.translation() -
+             turn * Eigen::Vector3d(1.0, 0.0, 0.0))
+                .norm(),
+            1e-12);
+}
+
 // The match left one direction open: there the edge is weak, and nowhere else.
 TEST(KeyframeEdges, AreWeakWhereTheMatchKnewNothing) {
   Begun begun({});

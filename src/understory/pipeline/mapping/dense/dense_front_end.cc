@@ -335,13 +335,18 @@ void DenseFrontEnd::note_outcome(const DenseEstimate& estimate, ScanRecord& reco
 
 void DenseFrontEnd::update_map(const DenseEstimate& estimate, ScanRecord& record) {
   NavState state = estimate.state;
-  if (estimate.update.new_world_from_old_world) {
-    map_->move_world(*estimate.update.new_world_from_old_world);
-    if (satellites_) satellites_->level_world(*estimate.update.new_world_from_old_world);
+  std::optional<Pose> back;  // a later piece does not turn about the origin of the world
+  if (const std::optional<Pose>& levelled = estimate.update.new_world_from_old_world) {
+    back = map_->level(*levelled, state.world_from_body);
+    if (satellites_) satellites_->level_world(*levelled);
   }
   positioned_.pose = {record.stamp, state.world_from_body};
   if (satellites_) tell_satellites(estimate);
   positioned_.new_world_from_old_world = estimate.update.new_world_from_old_world;
+  if (back) {
+    move_world(*back);
+    state.world_from_body = *back * state.world_from_body;
+  }
   const bool good =
       record.outcome == ScanOutcome::kMatched && estimate.thinned.size() >= kFewPoints;
   // A scan without points is no failed match: whether the position is lost, the next ones tell.
