@@ -314,15 +314,16 @@ void LoopCloser::begin(const std::vector<Keyframe>& keyframes,
                        const std::vector<std::uint64_t>& piece_starts, KeyframePoints& points) {
   Search search{config_,          local_map_config_, searched(keyframes, piece_starts, points),
                 agreement_.get(), decided_,          leave_map_};
-  running_.emplace();
-  running_->keyframes = keyframes.size();
-  running_->outcome = std::async(std::launch::async, [this, search = std::move(search)]() mutable {
-    const SideWork::Scope working(work_);
-    LoopOutcome outcome;
-    // One thread: the others belong to the scan loop.
-    in_arena(1, [&] { outcome = run_search(std::move(search), abandoned_); });
-    return outcome;
-  });
+  // Nothing runs if no thread is to be had.
+  std::future<LoopOutcome> found =
+      std::async(std::launch::async, [this, search = std::move(search)]() mutable {
+        const SideWork::Scope working(work_);
+        LoopOutcome outcome;
+        // One thread: the others belong to the scan loop.
+        in_arena(1, [&] { outcome = run_search(std::move(search), abandoned_); });
+        return outcome;
+      });
+  running_.emplace(Running{keyframes.size(), std::move(found)});
 }
 
 std::optional<LoopOutcome> LoopCloser::take(std::size_t keyframes, bool wait, bool when_found,
@@ -334,8 +335,10 @@ std::optional<LoopOutcome> LoopCloser::take(std::size_t keyframes, bool wait, bo
   if (!wait && !(when_found ? ready : keyframes >= due)) return std::nullopt;
   while (running_->outcome.wait_for(kPollInterval) != std::future_status::ready)
     progress.poll();
-  LoopOutcome outcome = running_->outcome.get();
+  // No longer the running one, also if it has failed: what it throws leaves nothing to wait for.
+  Running done = std::move(*running_);
   running_.reset();
+  LoopOutcome outcome = done.outcome.get();
   keep(outcome);
   return outcome;
 }
