@@ -170,12 +170,12 @@ void ImuSmoother::watch_imu(TimeNs stamp, const MotionInterval& interval,
 
 // Scan matches have contradicted the prediction for long, or the IMU turned out to be unusable.
 // Nothing that the estimate says of the motion is then worth keeping.
-void ImuSmoother::restart_at(TimeNs stamp, const PoseFactor& lidar,
-                             const Eigen::Vector3d& velocity) {
+void ImuSmoother::restart_at(TimeNs stamp, const PoseFactor& lidar, const MatchMotion& motion) {
+  restarted_ = stamp;
   ImuState state = latest();
   state.stamp = stamp;
   state.world_from_imu = lidar.world_from_imu;
-  state.velocity = velocity;
+  state.velocity = motion.velocity;
   InitialUncertainty sigma;
   sigma.rotation_rad = std::sqrt(lidar.covariance.diagonal().head<3>().maxCoeff());
   sigma.position_m = std::sqrt(lidar.covariance.diagonal().tail<3>().maxCoeff());
@@ -198,8 +198,7 @@ void ImuSmoother::note_residual(const MotionPrediction& predicted, const PoseFac
 }
 
 MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interval,
-                                      const PoseFactor& lidar,
-                                      const Eigen::Vector3d& match_velocity) {
+                                      const PoseFactor& lidar, const MatchMotion& match_motion) {
   const ImuState before = latest();
   const MotionPrediction predicted = predict_full(stamp);
   const WindowSmoother backup = window_;
@@ -222,7 +221,7 @@ MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interv
   if (dropped_in_a_row_ >= config_.velocity_gate_patience && !watch_.vouched_for(stamp)) {
     dropped_in_a_row_ = 0;
     watch_.suspect(stamp);
-    restart_at(stamp, lidar, match_velocity);
+    restart_at(stamp, lidar, match_motion);
     update.reason.clear();
     if (log_ != nullptr)
       log_->warn("odometry.restart",
@@ -242,6 +241,14 @@ MotionUpdate ImuSmoother::add_matched(TimeNs stamp, const MotionInterval& interv
   return update;
 }
 
+ImuSmoother::MatchMotion ImuSmoother::motion_since_last_match(TimeNs stamp,
+                                                              const Pose& world_from_imu) const {
+  const Pose& from = last_match_->world_from_imu;
+  const double seconds = to_seconds(stamp - last_match_->stamp);
+  return {(world_from_imu.translation() - from.translation()) / seconds,
+          so3_log(from.rotation().conjugate() * world_from_imu.rotation()) / seconds};
+}
+
 MotionUpdate ImuSmoother::add_scan(TimeNs stamp, const std::optional<LidarFactor>& factor) {
   if (!window_.started()) return begin(stamp);
   const ImuState before = latest();
@@ -252,17 +259,14 @@ MotionUpdate ImuSmoother::add_scan(TimeNs stamp, const std::optional<LidarFactor
   }
   std::optional<PoseFactor> lidar;
   bool matched = false;
-  Eigen::Vector3d match_velocity = before.velocity;
+  MatchMotion match_motion{before.velocity, angular_rate_};
   if (factor) {
     const Matrix6d adjoint = body_from_imu_.inverse().adjoint();
     lidar = PoseFactor{factor->world_from_body * body_from_imu_,
                        adjoint * lidar_covariance(*factor, config_.lidar) * adjoint.transpose()};
     matched = !factor->covariance;
-    if (matched && last_match_) {
-      match_velocity =
-          (lidar->world_from_imu.translation() - last_match_->world_from_imu.translation()) /
-          to_seconds(stamp - last_match_->stamp);
-    }
+    if (matched && last_match_)
+      match_motion = motion_since_last_match(stamp, lidar->world_from_imu);
   }
   MotionInterval interval = make_interval(before.stamp, stamp);
   const bool was_usable = use_imu();
@@ -270,12 +274,12 @@ MotionUpdate ImuSmoother::add_scan(TimeNs stamp, const std::optional<LidarFactor
 
   MotionUpdate update;
   if (was_usable != use_imu()) {
-    restart_at(stamp, *lidar, match_velocity);
+    restart_at(stamp, *lidar, match_motion);
     update.status = MotionStatus::kAccepted;
   } else {
     learn_vertical(interval);
     if (matched) {
-      update = add_matched(stamp, interval, *lidar, match_velocity);
+      update = add_matched(stamp, interval, *lidar, match_motion);
     } else if (lidar) {
       // A pose by other sensors has its own covariance, and jumps within it.
       add_state(stamp, interval, lidar);
@@ -287,7 +291,9 @@ MotionUpdate ImuSmoother::add_scan(TimeNs stamp, const std::optional<LidarFactor
   }
   const Eigen::Quaterniond turned =
       before.world_from_imu.rotation().conjugate() * latest().world_from_imu.rotation();
-  angular_rate_ = so3_log(turned) / to_seconds(stamp - before.stamp);
+  // A restart corrects the attitude. What it corrects is no motion.
+  angular_rate_ = restarted_ == stamp ? match_motion.angular_rate
+                                      : so3_log(turned) / to_seconds(stamp - before.stamp);
   buffer_.forget_before(stamp);
   if (config_.level_world) level(update);
   hand_over_to_isam();

@@ -37,6 +37,12 @@ class ImuSmoother : public MotionModel {
   void load(BinaryReader& reader) override;
 
  private:
+  // From one match to the next: metres a second in the world, radians a second in the IMU's frame.
+  struct MatchMotion {
+    Eigen::Vector3d velocity;
+    Eigen::Vector3d angular_rate;
+  };
+
   [[nodiscard]] bool use_imu() const { return watch_.usable(); }
   [[nodiscard]] const ImuState& latest() const;
   [[nodiscard]] const Matrix15d& covariance() const;
@@ -50,12 +56,13 @@ class ImuSmoother : public MotionModel {
   [[nodiscard]] MotionInterval make_interval(TimeNs from, TimeNs to) const;
   void note_residual(const MotionPrediction& predicted, const PoseFactor& lidar);
   MotionUpdate add_matched(TimeNs stamp, const MotionInterval& interval, const PoseFactor& lidar,
-                           const Eigen::Vector3d& match_velocity);
+                           const MatchMotion& match_motion);
   void add_state(TimeNs stamp, const MotionInterval& interval,
                  const std::optional<PoseFactor>& lidar);
   void watch_imu(TimeNs stamp, const MotionInterval& interval,
                  const std::optional<PoseFactor>& lidar);
-  void restart_at(TimeNs stamp, const PoseFactor& lidar, const Eigen::Vector3d& velocity);
+  [[nodiscard]] MatchMotion motion_since_last_match(TimeNs stamp, const Pose& world_from_imu) const;
+  void restart_at(TimeNs stamp, const PoseFactor& lidar, const MatchMotion& motion);
   void level(MotionUpdate& update);
   void hand_over_to_isam();
 
@@ -70,6 +77,7 @@ class ImuSmoother : public MotionModel {
   Eigen::Vector3d angular_rate_ = Eigen::Vector3d::Zero();  // over the last interval, IMU frame
   std::optional<TimeNs> vertical_since_;                    // when the IMU first told of gravity
   bool levelled_ = false;
+  std::optional<TimeNs> restarted_;  // when the estimate last began anew
   int dropped_in_a_row_ = 0;
   std::optional<ImuMatch> last_match_;
   ResidualScale residual_scale_;                     // of matches against the prediction by the IMU
