@@ -369,6 +369,9 @@ namespace tree_doubt {  // forest/trees/tree_doubt.cc
 inline constexpr double kWeakShare = 0.3;
 // degrees of a stem's circumference: who saw less saw less than a half of it [bound: geometry]
 inline constexpr double kHalfTurn = 180.0;
+// m above the ground: a stem that shows from there on only shows nothing at breast height [chosen:
+// breast height, and the thickness of a slice]
+inline constexpr double kHiddenTo = 1.5;
 // Doubt of a tree without a height [chosen]
 inline constexpr double kNoHeight = 0.5;
 // Doubt that the worst standard deviation adds: that of three diameters [chosen]

@@ -34,6 +34,8 @@ TEST(HiddenStems, AStemHiddenAroundBreastHeightIsMeasuredAbove) {
   EXPECT_NEAR(above[0].dbh_m, 0.3, 2.0 * above[0].dbh_sd_m);
   EXPECT_NEAR(above[0].dbh_m, 0.3, 0.02);
   EXPECT_GT(above[0].dbh_sd_m, whole[0].dbh_sd_m);
+  EXPECT_EQ(whole[0].quality, "good");
+  EXPECT_EQ(above[0].quality, "breast_height_hidden");
   const std::vector<Tree> high = hidden_to(2.3);  // its deviation tells of the taper
   ASSERT_EQ(high.size(), 1U);
   EXPECT_NEAR(high[0].dbh_m, 0.3, 2.0 * high[0].dbh_sd_m);

@@ -348,7 +348,8 @@ void describe_trees(const InventoryConfig& config, const DoubleImages& images,
     Tree& tree = result.trees[i];
     if (species != TaperSpecies::kUnknown) tree.species = taper_species_name(species);
     const bool stem = i < result.stems.size();
-    tree.quality = quality_of(tree, stem ? result.stems[i].arc_deg : Tree::kUnknown);
+    tree.quality = stem ? quality_of(tree, result.stems[i].arc_deg, result.stems[i].lowest_m)
+                        : quality_of(tree, Tree::kUnknown);
     if (stem && images.twice[i] != 0) tree.quality = "twice";
   }
 }

@@ -21,8 +21,8 @@ std::vector<Keyframe> round_walk(KeyframePoints& points) {
     const double angle = 2.0 * M_PI * i / kRound;
     Keyframe keyframe;
     keyframe.stamp = (i + 1) * kNsPerSecond;
-    keyframe.world_from_body = Pose(so3_exp({0.0, 0.0, angle}),
-                                    {16.0 * std::cos(angle), 16.0 * std::sin(angle), 0.0});
+    keyframe.world_from_body =
+        Pose(so3_exp({0.0, 0.0, angle}), {16.0 * std::cos(angle), 16.0 * std::sin(angle), 0.0});
     if (i > 0) {
       keyframe.previous_from_this =
           keyframes.back().world_from_body.inverse() * keyframe.world_from_body;

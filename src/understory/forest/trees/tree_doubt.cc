@@ -26,9 +26,10 @@ StandDoubts doubts_of(const std::vector<Tree>& trees) {
   return doubts;
 }
 
-std::string quality_of(const Tree& tree, double arc_deg) {
+std::string quality_of(const Tree& tree, double arc_deg, double seen_from_m) {
   if (!std::isfinite(tree.dbh_m)) return "no_diameter";
   if (has_weak_diameter(tree)) return "weak_diameter";
+  if (seen_from_m > kHiddenTo) return "breast_height_hidden";
   return arc_deg < kHalfTurn ? "one_side" : "good";
 }
 

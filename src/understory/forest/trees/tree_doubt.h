@@ -25,11 +25,13 @@ struct StandDoubts {
 // How far the diameter of a tree is to be trusted, in one word for a table, the worst that applies:
 // - "no_diameter": it was found by its crown alone,
 // - "weak_diameter": see has_weak_diameter,
+// - "breast_height_hidden": nothing was seen of its stem below 1.5 m above the ground,
 // - "one_side": less than half of its circumference was seen,
 // - "good": none of these.
 // A cut has "two_rings" as well (slice/slice_stems.h), a cloud "twice" (trees/double_images.h).
-// `arc_deg`: as of doubt_of.
-[[nodiscard]] std::string quality_of(const Tree& tree, double arc_deg);
+// `arc_deg`: as of doubt_of. `seen_from_m`: height above the ground from which on its stem was
+// seen.
+[[nodiscard]] std::string quality_of(const Tree& tree, double arc_deg, double seen_from_m = 0.0);
 
 // How doubtful a tree is, to sort trees by it: larger is worse, 0 is certain. The relative standard
 // deviation of the diameter over 30 %, plus the share of the circumference beyond a half that was

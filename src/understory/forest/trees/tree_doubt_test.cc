@@ -33,7 +33,9 @@ TEST(TreeDoubt, QualityIsTheWorstThatIsKnownOfADiameter) {
       << "a height counts not";
   EXPECT_EQ(quality_of(tree_with_sd(0.2, kUnknown, 12.0), 180.0), "good");
   EXPECT_EQ(quality_of(tree_with_sd(0.2, 0.01, 12.0), 179.0), "one_side");
-  EXPECT_EQ(quality_of(tree_with_sd(0.2, 0.061, 12.0), 100.0), "weak_diameter");
+  EXPECT_EQ(quality_of(tree_with_sd(0.2, 0.01, 12.0), 100.0, 1.4), "one_side");
+  EXPECT_EQ(quality_of(tree_with_sd(0.2, 0.01, 12.0), 100.0, 1.6), "breast_height_hidden");
+  EXPECT_EQ(quality_of(tree_with_sd(0.2, 0.061, 12.0), 100.0, 1.6), "weak_diameter");
   EXPECT_EQ(quality_of(tree_with_sd(kUnknown, kUnknown, 12.0), kUnknown), "no_diameter");
 }
 

@@ -53,8 +53,7 @@ TEST(ImuRestart, WhatItCorrectsIsNoTurn) {
       model->add_imu(wrong_sample(imu_t));
     const Pose truth(so3_exp({0.0, 0.0, turned_deg(t) * kDegree}), Eigen::Vector3d::Zero());
     const TimeNs stamp = from_seconds(t);
-    const double off =
-        (model->predict(stamp).world_from_body.inverse() * truth).angle() / kDegree;
+    const double off = (model->predict(stamp).world_from_body.inverse() * truth).angle() / kDegree;
     if (restarted) worst_after = std::max(worst_after, off);
     const MotionUpdate update =
         model->add_scan(stamp, scan == 0 ? std::nullopt : std::optional(right_match(truth)));
