@@ -109,6 +109,24 @@ def refused(folder):
     assert old.read_text().startswith("id,x,y")
 
 
+@cases.case("a diameter of 0, -1 or -9999 is refused by its line, and another unit by its name")
+def no_diameters(folder):
+    trees = stand(60, 25.0)
+    old, new = write(folder / "old.csv", trees, 1), folder / "new.csv"
+    for unknown in (0.0, -1.0, -9999.0, 1e6):
+        rows = write(new, trees, 2).read_text().splitlines()
+        cells = rows[9].split(",")
+        rows[9] = ",".join(cells[:3] + [str(unknown)] + cells[4:])
+        new.write_text("\n".join(rows) + "\n")
+        for words in (("evaluate", "trees", old, new), ("evaluate", "trees", old, new, "--epochs"),
+                      ("merge", new, old, "-o", folder / "both")):
+            done = program(*words)
+            assert done.returncode == 3 and "line 10" in done.stderr, (unknown, done)
+            assert "empty cell" in done.stderr and not (folder / "both").exists(), (unknown, done)
+    write(new, [(x, y, 100 * d) for x, y, d in trees], 2)
+    assert "centimetres" in compared(old, new, "--epochs", expected=4).stderr
+
+
 @cases.case("a list that is one radius off is not called complete")
 def misfit(folder):
     trees = stand()

@@ -78,6 +78,11 @@ inline constexpr double kMostMissedShare = 0.5;
 inline constexpr double kPathStepM = 0.5;
 }  // namespace tree_changes
 
+namespace tree_errors {  // evaluation/trees/tree_errors.cc
+// m: no tree is thicker at breast height [bound: the thickest known one, a cypress of 11.6 m]
+inline constexpr double kThickestTreeM = 12.0;
+}  // namespace tree_errors
+
 namespace tree_list_check {  // evaluation/trees/tree_list_check.cc
 // m: no stand has a larger median of diameters; groves of giant sequoias come near it [bound:
 // forests]

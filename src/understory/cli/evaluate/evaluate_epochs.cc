@@ -90,6 +90,9 @@ bool lay_by_trees(Epoch& before, const Epoch& after, const TreeOptions& options,
 // Why the lists do not show two epochs of one stand; empty if they do.
 std::string stand_complaint(const Epoch& before, const Epoch& after,
                             const std::vector<TreePair>& pairs, const TreeOptions& options) {
+  for (const Epoch* epoch : {&before, &after})
+    if (std::string unit = diameter_complaint(epoch->trees); !unit.empty())
+      return epoch->name + ": " + unit;
   if (are_copies(before.trees, after.trees)) return "one list is a copy of the other";
   const bool searched = options.alignment != "none";
   const MatchChance chance =

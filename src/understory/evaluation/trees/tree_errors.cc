@@ -1,17 +1,23 @@
 #include "understory/evaluation/trees/tree_errors.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "understory/evaluation/evaluation_constants.h"
 #include "understory/evaluation/plane_cells.h"
+#include "understory/evaluation/trees/tree_list_check.h"
 #include "understory/evaluation/world_frame.h"
 #include "understory/util/error.h"
 #include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {
+
+using evaluation_constants::tree_errors::kThickestTreeM;
 
 // Nothing where the cell is empty or not finite.
 std::optional<int> whole_number(const CsvReader& table, const std::string& column) {
@@ -31,6 +37,21 @@ void read_cell(const CsvReader& table, const TreeColumn& column, Tree& tree) {
   } else if (const auto value = whole_number(table, column.name)) {
     tree.*std::get<int Tree::*>(column.member) = *value;
   }
+}
+
+// A row whose diameter is no diameter in metres.
+struct ThickRow {
+  std::string position;
+  double dbh_m = 0.0;
+};
+
+// Refuses what stands for an unknown diameter elsewhere: 0, -1, -9999.
+void refuse_no_diameter(const CsvReader& table, const Tree& tree) {
+  if (tree.dbh_m <= 0.0)
+    table.fail(fmt::format(
+        "expected a diameter above 0 in column 'dbh_m', found {:.6g}: an unknown one is an empty "
+        "cell",
+        tree.dbh_m));
 }
 
 double ratio(std::size_t part, std::size_t whole) {
@@ -69,10 +90,14 @@ class NearPath {
 std::vector<Tree> read_trees(const std::filesystem::path& path) {
   CsvReader table(path, {"x", "y"}, {.edit = turned_back(path)});
   std::vector<Tree> trees;
+  std::optional<ThickRow> thick;
   while (table.next()) {
     Tree tree;
     for (const TreeColumn& column : kTreeColumns)
       read_cell(table, column, tree);
+    refuse_no_diameter(table, tree);
+    if (tree.dbh_m > kThickestTreeM && !thick)
+      thick = ThickRow{table.lines().position(), tree.dbh_m};
     if (!std::isfinite(table.number("id"))) tree.id = static_cast<int>(trees.size()) + 1;
     tree.x = table.finite("x");
     tree.y = table.finite("y");
@@ -80,6 +105,13 @@ std::vector<Tree> read_trees(const std::filesystem::path& path) {
     tree.felled = !table.text("felled_at").empty();
     trees.push_back(tree);
   }
+  // Where the whole list is in another unit, its reader says which.
+  if (thick && diameter_complaint(trees).empty())
+    throw InputError(
+        path.string(), thick->position,
+        fmt::format("expected a diameter in metres in column 'dbh_m', found {:.6g}: no tree is "
+                    "thicker than {:.0f} m, and an unknown diameter is an empty cell",
+                    thick->dbh_m, kThickestTreeM));
   return trees;
 }
 

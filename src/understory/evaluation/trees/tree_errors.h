@@ -15,8 +15,9 @@ namespace understory {
 
 // Reads trees.csv (docs/reference/outputs.md); of its columns only x and y are needed; a time in
 // felled_at marks a tree as felled. Those of a run in north, east, down are turned back
-// (world_frame.h). Throws InputError with the line where a position is missing or a cell is no
-// number.
+// (world_frame.h). Throws InputError with the line where a position is missing, a cell is no
+// number, or a diameter is not positive. A diameter that no tree has throws too, where the list
+// itself is in metres.
 [[nodiscard]] std::vector<Tree> read_trees(const std::filesystem::path& path);
 
 // Finds the motion that lays A on B without a start value. Pairs of trees of A and equally distant

@@ -187,5 +187,38 @@ TEST(TreeErrors, ReadsTheColumnsByName) {
   std::filesystem::remove(path);
 }
 
+// What reading a list says, that has six trees in `unit` and one with `dbh` in line 8.
+std::string complaint_of_diameter(const std::string& dbh, double unit = 1.0) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "trees.csv";
+  std::ofstream list(path);
+  list << "x,y,dbh_m\n";
+  for (int k = 0; k < 6; ++k)
+    list << 3 * k << ",0," << 0.3 * unit << "\n";
+  list << "1,5," << dbh << "\n";
+  list.close();
+  try {
+    (void)read_trees(path);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+// Bug: a dbh of -9999 counted as a diameter, and a list of negative ones ended the program.
+TEST(TreeErrors, ADiameterThatIsNoneIsRefused) {
+  for (const char* dbh : {"0", "-1", "-9999", "-inf"}) {
+    const std::string complaint = complaint_of_diameter(dbh);
+    EXPECT_NE(complaint.find("line 8"), std::string::npos) << complaint;
+    EXPECT_NE(complaint.find("empty cell"), std::string::npos) << complaint;
+  }
+  for (const char* dbh : {"25", "1e6", "inf"})
+    EXPECT_NE(complaint_of_diameter(dbh).find("line 8"), std::string::npos) << dbh;
+  for (const char* dbh : {"", "nan", "0.004", "11.6"})
+    EXPECT_EQ(complaint_of_diameter(dbh), "") << dbh;
+  // A list in centimetres is read: who compares it says which unit it is in.
+  EXPECT_EQ(complaint_of_diameter("25", 100.0), "");
+}
+
 }  // namespace
 }  // namespace understory

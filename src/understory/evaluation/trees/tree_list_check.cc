@@ -27,7 +27,7 @@ std::vector<Row> sorted_rows(const std::vector<Tree>& trees) {
 }
 
 std::string unit_of_median(double median) {
-  if (median < kThinnestMedianM) return "they look like kilometres, or are unknown ones set to 0";
+  if (median < kThinnestMedianM) return "they look like kilometres";
   return median > kThickestCentimetres ? "they look like millimetres"
                                        : "they look like centimetres or inches";
 }
@@ -37,7 +37,7 @@ std::string unit_of_median(double median) {
 std::string diameter_complaint(const std::vector<Tree>& trees) {
   std::vector<double> known;
   for (const Tree& tree : trees)
-    if (std::isfinite(tree.dbh_m)) known.push_back(tree.dbh_m);
+    if (std::isfinite(tree.dbh_m) && tree.dbh_m > 0.0) known.push_back(tree.dbh_m);
   if (known.size() < kLeastKnown) return {};
   const double median = upper_median(known);
   if (median >= kThinnestMedianM && median <= kThickestMedianM) return {};

@@ -36,6 +36,7 @@ TEST(TreeListCheck, DiametersInAnotherUnitAreNamed) {
   EXPECT_NE(diameter_complaint(tree_grid(1000.0)).find("millimetres"), std::string::npos);
   EXPECT_NE(diameter_complaint(tree_grid(0.001)).find("no metres"), std::string::npos);
   EXPECT_EQ(diameter_complaint(tree_grid(1.0 / 0.3048)), "");  // feet: a stand of veterans
+  EXPECT_EQ(diameter_complaint(tree_grid(-1.0)), "");  // no diameters: their reader refuses them
   EXPECT_EQ(diameter_complaint(std::vector<Tree>(40)), "");
   EXPECT_EQ(diameter_complaint(std::vector<Tree>()), "");
 }
