@@ -127,6 +127,20 @@ def no_diameters(folder):
     assert "centimetres" in compared(old, new, "--epochs", expected=4).stderr
 
 
+@cases.case("a permanent plot that was measured anew is compared, also where trees keep their places")
+def permanent_plot(folder):
+    rows = [(x, y, d) for x, y, d in stand(100, 35.0)]
+    lists = []
+    for name, grown in (("old", 0.0), ("new", 0.02)):
+        lists.append(folder / f"{name}.csv")
+        lists[-1].write_text("x,y,dbh_m,height_m\n" + "".join(
+            f"{x:.2f},{y:.2f},{d + grown:.3f},{12 + 30 * d + 50 * grown:.1f}\n" for x, y, d in rows))
+    told = json.loads(compared(*lists, "--epochs", "--json").stdout)
+    assert told["stays"] == 100 and abs(told["dbh_increment_m"]["mean"] - 0.02) < 1e-9, told
+    done = program("merge", *lists, "-o", folder / "both")
+    assert done.returncode == 0, done
+
+
 @cases.case("a list that is one radius off is not called complete")
 def misfit(folder):
     trees = stand()

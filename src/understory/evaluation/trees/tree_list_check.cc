@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
 #include <tuple>
 
 #include "understory/evaluation/evaluation_constants.h"
 #include "understory/util/median.h"
+#include "understory/util/stable_sort.h"
 
 namespace understory {
 namespace {
@@ -18,12 +18,21 @@ using namespace evaluation_constants::tree_list_check;
 
 // Place and observations.
 using Row = std::tuple<double, double, int>;
-std::vector<Row> sorted_rows(const std::vector<Tree>& trees) {
-  std::vector<Row> rows;
+Row row_of(const Tree& tree) {
+  return {tree.x, tree.y, tree.observations};
+}
+
+std::vector<const Tree*> by_row(const std::vector<Tree>& trees) {
+  std::vector<const Tree*> sorted;
   for (const Tree& tree : trees)
-    rows.emplace_back(tree.x, tree.y, tree.observations);
-  std::sort(rows.begin(), rows.end());
-  return rows;
+    sorted.push_back(&tree);
+  sort_stably(sorted, [](const Tree* a, const Tree* b) { return row_of(*a) < row_of(*b); });
+  return sorted;
+}
+
+// Whether both are known and not the same.
+bool differ(double a, double b) {
+  return std::isfinite(a) && std::isfinite(b) && a != b;
 }
 
 std::string unit_of_median(double median) {
@@ -61,13 +70,13 @@ std::string diameter_complaint(const std::vector<Tree>& a, const std::vector<Tre
 }
 
 std::size_t doubled_rows(const std::vector<Tree>& trees) {
-  const std::vector<Row> rows = sorted_rows(trees);
+  const std::vector<const Tree*> rows = by_row(trees);
   std::size_t doubled = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const auto& [x, y, seen] = rows[i];
+    const Tree& tree = *rows[i];
     bool found = false;
-    for (std::size_t j = i; !found && j-- > 0 && x - std::get<0>(rows[j]) <= kOneStemM;)
-      found = std::hypot(x - std::get<0>(rows[j]), y - std::get<1>(rows[j])) <= kOneStemM;
+    for (std::size_t j = i; !found && j-- > 0 && tree.x - rows[j]->x <= kOneStemM;)
+      found = std::hypot(tree.x - rows[j]->x, tree.y - rows[j]->y) <= kOneStemM;
     doubled += found ? 1 : 0;
   }
   return doubled;
@@ -84,12 +93,22 @@ std::string doubles_complaint(const std::vector<Tree>& trees) {
 }
 
 bool are_copies(const std::vector<Tree>& a, const std::vector<Tree>& b) {
-  const std::vector<Row> of_a = sorted_rows(a);
-  const std::vector<Row> of_b = sorted_rows(b);
-  std::vector<Row> both;
-  std::set_intersection(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(),
-                        std::back_inserter(both));
-  return !both.empty() && 2 * both.size() > std::min(a.size(), b.size());
+  const std::vector<const Tree*> of_a = by_row(a);
+  const std::vector<const Tree*> of_b = by_row(b);
+  std::size_t both = 0;
+  std::size_t measured_anew = 0;
+  for (auto i = of_a.begin(), j = of_b.begin(); i != of_a.end() && j != of_b.end();) {
+    const Row row_i = row_of(**i);
+    const Row row_j = row_of(**j);
+    if (row_i == row_j) {
+      ++both;
+      measured_anew += differ((*i)->dbh_m, (*j)->dbh_m) || differ((*i)->height_m, (*j)->height_m);
+    }
+    if (row_i <= row_j) ++i;
+    if (row_j <= row_i) ++j;
+  }
+  return both > 0 && 2 * both > std::min(a.size(), b.size()) &&
+         static_cast<double>(measured_anew) <= kMostAnew * static_cast<double>(both);
 }
 
 }  // namespace understory

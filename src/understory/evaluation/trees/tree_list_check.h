@@ -25,7 +25,8 @@ namespace understory {
 
 // Whether one list is a copy of the other, or of a part of it. Over half of the trees of the
 // shorter one then stand in the longer one, in any order. They have the same place to the last
-// digit and as many observations.
+// digit and as many observations, and nearly all the same diameter and height where both know it.
+// Trees of a permanent plot stay where they are, and are measured anew.
 [[nodiscard]] bool are_copies(const std::vector<Tree>& a, const std::vector<Tree>& b);
 
 }  // namespace understory

@@ -80,5 +80,27 @@ TEST(TreeListCheck, ACopyIsKnownInAnyOrderAndWithMoreRows) {
   EXPECT_FALSE(are_copies({}, {}));
 }
 
+// Bug: permanent plots that were measured anew counted as copies, since trees stay in their places.
+TEST(TreeListCheck, APlotThatIsMeasuredAnewIsNoCopy) {
+  std::vector<Tree> later = tree_grid();
+  for (std::size_t k = 0; k < later.size(); ++k)
+    if (k % 3 == 0) later[k].dbh_m += 0.01;
+  EXPECT_FALSE(are_copies(tree_grid(), later));
+  std::vector<Tree> corrected = tree_grid();
+  corrected[7].dbh_m += 0.01;
+  EXPECT_TRUE(are_copies(tree_grid(), corrected));
+  std::vector<Tree> bare = tree_grid();  // the same list without diameters
+  for (Tree& tree : bare)
+    tree.dbh_m = Tree::kUnknown;
+  EXPECT_TRUE(are_copies(tree_grid(), bare));
+  std::vector<Tree> old = tree_grid();
+  std::vector<Tree> higher = tree_grid();
+  for (std::size_t k = 0; k < old.size(); ++k) {
+    old[k].height_m = 12.0;
+    higher[k].height_m = 13.0;
+  }
+  EXPECT_FALSE(are_copies(old, higher));
+}
+
 }  // namespace
 }  // namespace understory
