@@ -187,6 +187,40 @@ TEST(CloudFile, KeepsWhatIsThereOfACutFile) {
   EXPECT_EQ(test::count_of(log, "recording.damaged"), 1U);
 }
 
+std::size_t damage_in(const Bytes& file) {
+  Log log;
+  EXPECT_EQ(read_cloud_bytes(file, log).points.size(), static_cast<std::size_t>(kCloudPoints));
+  return test::count_of(log, "recording.damaged");
+}
+
+// Bug: a header that states fewer points than there are took them silently away.
+TEST(CloudFile, TellsOfPointsBehindThoseOfTheHeader) {
+  const std::string line = "1 2 3 4 5\n";
+  for (const std::string& header : {pcd_header("ascii"), ply_header("ascii")}) {
+    EXPECT_EQ(damage_in(join(header + ascii_points() + line, {})), 1U);
+    EXPECT_EQ(damage_in(join(header + ascii_points() + "\n \n", {})), 0U);
+  }
+  for (const std::string& header : {pcd_header("binary"), ply_header("binary_little_endian")}) {
+    const Bytes file = join(header, binary_points());
+    Bytes longer = file;
+    test::append(longer, Bytes(20, 7));
+    EXPECT_EQ(damage_in(longer), 1U);
+    longer = file;
+    test::append(longer, Bytes(4096, 0));  // padding
+    EXPECT_EQ(damage_in(longer), 0U);
+  }
+  // Faces behind the vertices are none of them.
+  std::string faces = ply_header("ascii");
+  faces.replace(faces.find("face 0"), 6, "face 2");
+  EXPECT_EQ(damage_in(join(faces + ascii_points() + "4 0 1 2 3\n4 1 2 3 4\n", {})), 0U);
+  EXPECT_EQ(damage_in(join(faces + ascii_points() + "4 0 1 2 3\n4 1 2 3 4\n" + line, {})), 1U);
+  faces = ply_header("binary_little_endian");
+  faces.replace(faces.find("face 0"), 6, "face 9");
+  Bytes meshed = join(faces, binary_points());
+  test::append(meshed, Bytes(117, 3));
+  EXPECT_EQ(damage_in(meshed), 0U);
+}
+
 // Points of three numbers (Newer College's binaries) came through as a scan of points in wrong
 // places.
 TEST(CloudFile, RefusesBinariesOfAnotherPointSize) {

@@ -40,6 +40,41 @@ void CloudTable::add_field(const std::string& name, FieldType type, std::uint32_
   point_step += field_size(type) * count;
 }
 
+namespace {
+
+void report_surplus(const ByteSource& file, std::uint64_t position, std::uint64_t surplus,
+                    std::uint64_t stated, Log& log) {
+  report_finding(log, Finding::kDamage,
+                 file.name() + ": at byte " + std::to_string(position) + ": " +
+                     std::to_string(surplus) + " more points than the " + std::to_string(stated) +
+                     " of the header, left out");
+}
+
+}  // namespace
+
+void warn_of_surplus(ByteSource& file, std::uint64_t position, const CloudTable& table, Log& log) {
+  if (position >= file.size()) return;
+  const std::uint64_t surplus = (file.size() - position) / table.point_step;
+  if (surplus == 0) return;
+  std::vector<std::uint8_t> first;
+  file.read(position, table.point_step, first);
+  if (std::any_of(first.begin(), first.end(), [](std::uint8_t byte) { return byte != 0; }))
+    report_surplus(file, position, surplus, table.size(), log);
+}
+
+void warn_of_surplus(ByteSource& file, TextLines& lines, std::size_t least, std::uint64_t stated,
+                     Log& log) {
+  const std::uint64_t position = lines.position();
+  std::uint64_t surplus = 0;
+  std::string_view line;
+  std::vector<std::string_view> words;
+  while (lines.next(line)) {
+    split_words(line, words);
+    surplus += words.size() >= least ? 1 : 0;
+  }
+  if (surplus > 0) report_surplus(file, position, surplus, stated, log);
+}
+
 PointCloud2Message CloudTable::message(TimeNs stamp) const {
   PointCloud2Message message;
   message.header.stamp = stamp;

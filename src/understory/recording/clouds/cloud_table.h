@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "understory/recording/bags/byte_source.h"
+#include "understory/recording/clouds/text_lines.h"
 #include "understory/recording/messages/message_decode.h"
 #include "understory/util/log.h"
 
@@ -30,6 +31,13 @@ struct CloudTable {
   // A view: valid as long as the table.
   [[nodiscard]] PointCloud2Message message(TimeNs stamp) const;
 };
+
+// Warns of points behind those that the header states, "recording.damaged". The first looks at
+// records of `point_step` bytes from `position` on; zeros there are padding. The second counts the
+// lines with `least` words and more up to the end.
+void warn_of_surplus(ByteSource& file, std::uint64_t position, const CloudTable& table, Log& log);
+void warn_of_surplus(ByteSource& file, TextLines& lines, std::size_t least, std::uint64_t stated,
+                     Log& log);
 
 // Writes a number as the field's type; out of range values are clamped, NaN in an integer is 0.
 void store_number(double value, FieldType type, std::uint8_t* into);

@@ -168,6 +168,7 @@ void read_binary(ByteSource& file, const PcdHeader& header, CloudTable& table, L
   file.read(header.position, header.points * table.point_step, table.data);
   const std::size_t whole = table.size();
   table.data.resize(whole * table.point_step);
+  warn_of_surplus(file, header.position + table.data.size(), table, log);
   if (whole < header.points) warn_short(file, file.size(), whole, header.points, log);
   integers_to_doubles(header, table);
 }
@@ -245,6 +246,7 @@ void read_ascii(ByteSource& file, const PcdHeader& header, CloudTable& table, Lo
                        std::to_string(words_per_point) + " numbers, left out");
   }
   if (points < header.points) warn_short(file, file.size(), points, header.points, log);
+  warn_of_surplus(file, lines, words_per_point, header.points, log);
 }
 
 }  // namespace

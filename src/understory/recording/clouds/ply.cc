@@ -137,6 +137,24 @@ void warn_short(const ByteSource& file, std::uint64_t have, std::uint64_t stated
                      std::to_string(have) + " of " + std::to_string(stated) + " points are there");
 }
 
+// Lines of the elements behind the vertices.
+std::uint64_t rows_behind(const PlyHeader& header, const Element& vertex) {
+  std::uint64_t rows = 0;
+  for (const Element* element = &vertex + 1; element <= &header.elements.back(); ++element)
+    rows += element->count;
+  return rows;
+}
+
+// Bytes of the elements behind the vertices; nothing where only their lists tell.
+std::optional<std::uint64_t> bytes_behind(const PlyHeader& header, const Element& vertex) {
+  std::uint64_t bytes = 0;
+  for (const Element* element = &vertex + 1; element <= &header.elements.back(); ++element) {
+    if (element->has_list && element->count > 0) return std::nullopt;
+    bytes += element->count * element->size();
+  }
+  return bytes;
+}
+
 void read_ascii(ByteSource& file, const PlyHeader& header, std::uint64_t skip,
                 const Element& vertex, CloudTable& table, Log& log) {
   TextLines lines(file, header.position);
@@ -169,6 +187,12 @@ void read_ascii(ByteSource& file, const PlyHeader& header, std::uint64_t skip,
                        std::to_string(table.fields.size()) + " numbers, left out");
   }
   if (points < vertex.count) warn_short(file, points, vertex.count, log);
+  std::uint64_t behind = rows_behind(header, vertex);
+  while (behind > 0 && lines.next(line)) {
+    split_words(line, words);
+    if (!words.empty()) --behind;
+  }
+  warn_of_surplus(file, lines, table.fields.size(), vertex.count, log);
 }
 
 }  // namespace
@@ -198,6 +222,8 @@ CloudTable read_ply(ByteSource& file, Log& log) {
     const std::size_t whole = table.size();
     table.data.resize(whole * table.point_step);
     if (whole < vertex->count) warn_short(file, whole, vertex->count, log);
+    if (const auto behind = bytes_behind(header, *vertex))
+      warn_of_surplus(file, header.position + skip + table.data.size() + *behind, table, log);
   }
   table.width = static_cast<std::uint32_t>(table.size());
   if (table.size() == 0 && vertex->count > 0)
