@@ -78,8 +78,14 @@ def rounded_places(folder):
         cloud.x, cloud.y, cloud.z = np.array(plot()).T
         cloud.write(folder / "rounded.las")
         done = inventory(folder / "rounded.las", folder)
-        assert done.returncode in (0, 4), done
+        assert done.returncode == (4 if told else 0), done
         assert ("inventory.coarse_places" in done.stderr) == told, (scale, done.stderr)
+        run = json.loads((folder / "inventory" / "run.json").read_text())
+        assert run["status"] == ("untrusted" if told else "complete"), run
+        assert any("steps of 0.1 m" in reason for reason in run["reasons"]) == told, run
+        words = {tree["quality"] for tree in listed(folder)}
+        assert told or "good" in words, words
+        assert not told or words <= {"coarse", "weak_diameter", "no_diameter"} and "coarse" in words, words
         assert ("steps of 0.1 m" in done.stderr) == told, (scale, done.stderr)
     return done.stderr
 

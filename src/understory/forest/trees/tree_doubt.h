@@ -28,7 +28,8 @@ struct StandDoubts {
 // - "breast_height_hidden": nothing was seen of its stem below 1.5 m above the ground,
 // - "one_side": less than half of its circumference was seen,
 // - "good": none of these.
-// A cut has "two_rings" as well (slice/slice_stems.h), a cloud "twice" (trees/double_images.h).
+// A cut has "two_rings" as well (slice/slice_stems.h), a cloud "twice" (trees/double_images.h), and
+// "coarse" where its places are rounded (pipeline/inventory/cloud_inventory.cc).
 // `arc_deg`: as of doubt_of. `seen_from_m`: height above the ground from which on its stem was
 // seen.
 [[nodiscard]] std::string quality_of(const Tree& tree, double arc_deg, double seen_from_m = 0.0);

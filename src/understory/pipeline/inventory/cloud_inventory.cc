@@ -124,6 +124,17 @@ double thickness_of(const StandCloud& stand) {
   return static_cast<double>(high->z() - low->z());
 }
 
+// Diameters of a cloud whose places are rounded.
+void mark_coarse(InventoryResult& inventory) {
+  for (Tree& tree : inventory.trees)
+    if (tree.quality == "good" || tree.quality == "one_side") tree.quality = "coarse";
+}
+
+bool has_diameters(const InventoryResult& inventory) {
+  return std::any_of(inventory.trees.begin(), inventory.trees.end(),
+                     [](const Tree& tree) { return std::isfinite(tree.dbh_m); });
+}
+
 // What the user has to know before using the numbers. The map of a run is judged as `map` does.
 void judge(const Stock& stock, const InventoryRequest& request, const Log& log,
            RunDocuments& documents) {
@@ -131,6 +142,8 @@ void judge(const Stock& stock, const InventoryRequest& request, const Log& log,
   const bool of_run = stock.of_run;
   if (const Found damage = found(log, Finding::kDamage); damage.count > 0)
     documents.lower(RunStatus::kPartial, "the cloud is not whole: " + damage.first);
+  if (!stock.stand.coarse.empty() && has_diameters(inventory))
+    documents.lower(RunStatus::kUntrusted, stock.stand.coarse);
   if (request.slice) {
     if (inventory.trees.empty()) documents.lower(RunStatus::kUntrusted, kNoStemInCut);
     return;
@@ -304,6 +317,7 @@ void take_stock(const InventoryRequest& request, const RunFolder& place, const f
   {
     const ScopedTimer timer(times, "inventory");
     stock.inventory = inventory_of(request, stock, blocks, progress);
+    if (!stock.stand.coarse.empty()) mark_coarse(stock.inventory);
     if (!request.slice) take_figures(request.config.stand, stock);
   }
   const ScopedTimer timer(times, "writing");

@@ -165,15 +165,16 @@ void refuse_rounded(const PointCloudFile& cloud, const std::string& name, const 
                   step_m));
 }
 
-// A cloud from the air may do with such steps: its trees are found by their crowns.
-void warn_of_steps(const PointCloudFile& cloud, const std::string& name, const CloudFrame& frame,
-                   Log& log) {
-  const double step_m = cloud.las_step * (frame.unit_m > 0.0 ? frame.unit_m : 1.0);
+// Warns of places that are rounded, and keeps the words. A cloud from the air may do with such
+// steps: its trees are found by their crowns.
+void warn_of_steps(const std::string& name, const CloudFrame& frame, Log& log, StandCloud& stand) {
+  const double step_m = stand.cloud.las_step * (frame.unit_m > 0.0 ? frame.unit_m : 1.0);
   if (step_m <= kRounding * kCoarsestStepM) return;
-  log.warn("inventory.coarse_places",
-           fmt::format("{}: places come in steps of {:.3g} m, so diameters are not to be trusted. "
-                       "Export the cloud with a scale factor of 0.001",
-                       name, step_m));
+  stand.coarse = fmt::format(
+      "places come in steps of {:.3g} m, so diameters are not to be trusted. Export the cloud with "
+      "a scale factor of 0.001",
+      step_m);
+  log.warn("inventory.coarse_places", name + ": " + stand.coarse);
 }
 
 void warn_of_lost(const PointCloudFile& cloud, std::uint64_t kept, const std::string& name,
@@ -195,13 +196,13 @@ StandCloud moved_stand(const std::string& name, const CloudFrame& frame, const L
   if (stand.streamed) {
     stand.cloud = stand.streamed->about;
     refuse_rounded(stand.cloud, name, frame);
-    warn_of_steps(stand.cloud, name, frame, log);
+    warn_of_steps(name, frame, log, stand);
     warn_of_lost(stand.cloud, stand.streamed->tiles->points(), name, log);
     return stand;
   }
   stand.cloud = read_cloud(name, log, progress, change);
   refuse_rounded(stand.cloud, name, frame);
-  warn_of_steps(stand.cloud, name, frame, log);
+  warn_of_steps(name, frame, log, stand);
   warn_of_lost(stand.cloud, stand.cloud.points.size(), name, log);
   for (const CloudMove& move : moves)
     move_cloud(move, stand.cloud);

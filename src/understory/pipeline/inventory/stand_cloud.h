@@ -34,6 +34,7 @@ struct StandCloud {
   std::optional<StreamedCloud> streamed;  // then they are there
   std::string doubt;                      // empty: none
   std::string suspicion;                  // that it is in feet; empty: none
+  std::string coarse;                     // that its places are rounded; empty: none
 };
 // Reads a cloud and turns and scales it as `frame` says; then its coordinate system is dropped,
 // with a warning. With `tiling` a large cloud is put into tiles on disk instead. Polls `progress`.
