@@ -119,8 +119,8 @@ TM35FIN = ('PROJCS["TM35FIN",GEOGCS["ETRS89",DATUM["European_Terrestrial_Referen
            'PARAMETER["false_northing",0],UNIT["metre",1]]')
 
 
-def write_terrain(path, national=True, sd_m=0.15):
-    """The hills in cells of 2 m with the noise that P1 gives for its model."""
+def write_terrain(path, national=True, sd_m=0.15, above=lambda x, y: 0.0):
+    """The hills in cells of 2 m with the noise that P1 gives for its model, and what stands above them."""
     east0, north0 = grid_east_north(0, 0) if national else (0.0, 0.0)
     c = s = 1.0
     if national:  # the local turn and scale of the grid, from the series itself
@@ -138,7 +138,7 @@ def write_terrain(path, national=True, sd_m=0.15):
         for column in range(160):
             e = -160 + 2 * column + 1
             x, y = (c * e - s * n) / scale2, (s * e + c * n) / scale2
-            heights.append(f"{HEIGHT - 18.0 + hills(x, y) + draw.gauss(0, sd_m):.3f}"
+            heights.append(f"{HEIGHT - 18.0 + hills(x, y) + above(x, y) + draw.gauss(0, sd_m):.3f}"
                            if abs(x) < 155 else "-9999")
         lines.append(" ".join(heights))
     path.write_text("\n".join(lines) + "\n")
@@ -280,6 +280,24 @@ def levelled(folder):
     assert abs(mean + origin - (HEIGHT - 18.0)) < 0.15, (mean, origin)
     assert after < 0.1 and 4 * after < before, (before, after)
     return f"height of the path {100 * before:.0f} -> {100 * after:.0f} cm"
+
+
+@cases.case("a surface model is no terrain model, and a constant is none of its errors")
+def surface(folder):
+    def crown(x, y):
+        cell = math.sin(12.9898 * math.floor(x / 4) + 78.233 * math.floor(y / 4)) * 43758.5453 % 1.0
+        return 6.0 + 9.0 * cell if cell > 0.35 else 0.0
+
+    told = {}
+    for name, above, code in (("higher", lambda x, y: 19.5, 0), ("surface", crown, 4)):
+        model = write_terrain(folder / f"{name}.asc", above=above)
+        done = georeference(PLACED, "--method", "terrain", "--dem", model, "-o", folder / name, "--json")
+        assert done.returncode == code, done
+        told[name] = json.loads(done.stdout)["terrain_median_m"]
+    run = json.loads((folder / "surface" / "run.json").read_text())
+    assert run["status"] == "untrusted", run
+    assert any("surface or canopy model" in reason for reason in run["reasons"]), run["reasons"]
+    return f"{told['higher']:.2f} m beside {told['surface']:.2f} m in the median"
 
 
 @cases.case("levelled to a model of the place itself, from a known start")

@@ -261,6 +261,10 @@ inline constexpr double kSearchedAtLeastM = 20.0;
 // Of fixes and trees together: chi squared beyond which they contradict each other [tuned: the GNSS
 // presets of docs/method/georeference.md, seeds 1 to 19, are off by up to 9.5 standard deviations]
 inline constexpr double kMostDisagreement = 100.0;
+// m: spread of the ground about a terrain model after the fit, at most. A constant is taken off
+// [chosen: laser models err by 0.3 m, crowns by their own height; 1.4 m of coarse national models
+// tell no tilt of a plot]
+inline constexpr double kMostTerrainSpreadM = 1.0;
 // m between the heights of a terrain model and of fixes: said from here on [chosen: fixes under
 // trees err by less in the mean of a path]
 inline constexpr double kHeightsDifferM = 8.0;

@@ -8,6 +8,7 @@
 #include "understory/georeference/terrain_file.h"
 #include "understory/pipeline/pipeline_constants.h"
 #include "understory/util/error.h"
+#include "understory/util/median.h"
 
 namespace understory {
 namespace {
@@ -106,6 +107,12 @@ void tell_levelled(const GeoreferenceRequest& request, const LevelledRun& levell
   if (2 * fit.used < fit.points)
     placement.doubt(fmt::format("only {} of {} points on the ground agree with the terrain model",
                                 fit.used, fit.points));
+  if (const double spread_m = kSdOverMad * fit.median_m; spread_m > kMostTerrainSpreadM)
+    placement.doubt(
+        fmt::format("the ground does not fit the terrain model: after the fit its heights differ "
+                    "by {:.2f} m (one standard deviation). The file may be a surface or canopy "
+                    "model, or have another datum",
+                    spread_m));
   placement.inputs.push_back(hash_input(request.terrain_model));
   if (fs::exists(request.run / "dtm.tif"))
     placement.inputs.push_back(hash_input(request.run / "dtm.tif"));
