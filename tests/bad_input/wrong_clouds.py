@@ -90,6 +90,18 @@ def rounded_places(folder):
     return done.stderr
 
 
+@cases.case("a cloud whose points are all of the class noise is told so, in memory and in tiles")
+def all_noise(folder):
+    cloud = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    cloud.header.scales = [0.001] * 3
+    cloud.x, cloud.y, cloud.z = np.array(plot()).T
+    cloud.classification = np.full(len(cloud.x), 7, dtype=np.uint8)
+    cloud.write(folder / "noise.las")
+    for options in ((), ("--set", "tiles.size_m=30")):
+        done = inventory(folder / "noise.las", folder, *options)
+        assert done.returncode == 3 and "all points are classed as noise" in done.stderr, done
+
+
 # The matrix alone says kilometres where the cloud moved by decimetres.
 @cases.case("two clouds in map coordinates, one of them tilted")
 def map_coordinates(folder):

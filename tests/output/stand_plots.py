@@ -102,7 +102,8 @@ def check_refusals(folder, cloud):
     geojson.write_text(json.dumps({"type": "FeatureCollection", "features": [{
         "type": "Feature", "properties": {"radius_m": 9.0}, "geometry": {"type": "Point", "coordinates": [27.0, 62.2]}}]}))
     files = {"empty": "id,x,y,radius_m\n", "nan": "id,x,y,radius_m\nA,nan,2,9\n",
-             "radius": f"id,x,y,radius_m\nA,{EAST},{NORTH},0\n", "columns": "id,x,y\nA,1,2\n"}
+             "radius": f"id,x,y,radius_m\nA,{EAST},{NORTH},0\n", "columns": "id,x,y\nA,1,2\n",
+             "reserved": f"id,x,y,radius_m\nseen,{EAST + 9},{NORTH + 9},9\n"}
     for name, text in files.items():
         (folder / f"{name}.csv").write_text(text)
     for words, code, message in [
@@ -112,7 +113,10 @@ def check_refusals(folder, cloud):
             (["--plots", folder / "radius.csv"], 3, "radius_m over 0"),
             (["--plots", folder / "columns.csv"], 3, "radius_m"),
             (["--plots", f"{EAST},{NORTH},-1"], 3, "radius_m over 0"),
-            (["--plots", "10,20,9"], 3, "none of the 1 overlaps"),
+            (["--plots", "10,20,9"], 3, "the plot lies outside of it"),
+            (["--plots", "10,20,9", "--set", "tiles.size_m=30"], 3, "the plot lies outside of it"),
+            (["--plots", folder / "reserved.csv"], 3, "expected another id"),
+            (["--plots", ""], 2, "--plots"), (["--plots", " "], 2, "--plots"), (["--plot-grid", ""], 2, "--plot-grid"),
             (["--plots", geojson], 3, "names no coordinate system"),
             (["--plots", f"{EAST},{NORTH},9", "--slice"], 2, "--slice"),
             (["--plot-grid", "-5"], 2, "stand.grid_m"), (["--plot-grid", "0.001"], 2, "expected cells of 1 to 1000 m")]:
@@ -122,6 +126,13 @@ def check_refusals(folder, cloud):
         assert not run.exists() or not any(run.iterdir()), (words, list(run.iterdir()))
     done = inventory(cloud, folder / "corner", "--plots", f"{EAST},{NORTH},9")
     assert done.returncode == 4 and "has no figures" in done.stderr, (done.returncode, done.stderr)
+    # Beside what was seen, and yet in the box of the cloud: the inventory is kept, as by `map`.
+    lone = laspy.read(cloud)
+    lone.points = lone.points[(lone.x < EAST + 15) | (lone.y < NORTH + 15)]
+    lone.write(folder / "l.las")
+    done = inventory(folder / "l.las", folder / "beside", "--plots", f"{EAST + 25},{NORTH + 25},4")
+    assert done.returncode == 4 and "(0 % of plot 1)" in done.stderr, (done.returncode, done.stderr)
+    assert (folder / "beside" / "trees.csv").read_text().count("\n") > 20
     corner = rows(folder / "corner" / "plots.csv")["1"]
     assert abs(float(corner["seen_share"]) - 0.25) < 0.02 and corner["stems_per_ha"] == ""
 

@@ -8,13 +8,21 @@
 namespace understory {
 
 void add_plot_options(CLI::App& command, PlotOptions& options) {
-  command.add_option(
-      "--plots", options.plots,
-      "Sample plots that get figures of their own, in the coordinates of trees.gpkg. "
-      "X,Y,R (one circle), a .csv with id,x,y,radius_m, or a GeoPackage with polygons "
-      "or with points and radius_m");
-  command.add_option("--plot-grid", options.grid_m,
-                     "Figures by grid cells of this side, metres (1 to 1000)");
+  // An empty variable of a script is no wish for a list without plots.
+  const auto given = [](const std::string& text) {
+    return trimmed(text).empty() ? std::string("expected a value, found an empty text")
+                                 : std::string();
+  };
+  command
+      .add_option("--plots", options.plots,
+                  "Sample plots that get figures of their own, in the coordinates of trees.gpkg. "
+                  "X,Y,R (one circle), a .csv with id,x,y,radius_m, or a GeoPackage with polygons "
+                  "or with points and radius_m")
+      ->check(given);
+  command
+      .add_option("--plot-grid", options.grid_m,
+                  "Figures by grid cells of this side, metres (1 to 1000)")
+      ->check(given);
 }
 
 std::vector<std::string> plot_settings(const PlotOptions& options, const std::string& prefix) {

@@ -21,6 +21,7 @@ namespace understory {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kAllSeen = "seen";  // the first row of plots.csv
 constexpr const char* kExpected =
     "expected sample plots: X,Y,R, a .csv with x, y and radius_m, or polygons (or points with a "
     "column radius_m) as a GeoPackage";
@@ -64,6 +65,9 @@ void check_all(const std::vector<PlotOutline>& plots, const std::string& file) {
   for (const PlotOutline& plot : plots) {
     if (!ids.insert(plot.id).second)
       throw InputError(file, "plot " + plot.id, "expected every id once");
+    if (plot.id == kAllSeen)
+      throw InputError(file, "plot " + plot.id,
+                       "expected another id: plots.csv calls so the whole area that was seen");
     check(plot, file);
   }
 }

@@ -64,6 +64,7 @@ TEST_F(PlotFile, ATableOfCircles) {
   expect_refused(write("c.csv", "id,x,y,radius_m\nA,1,2,-3\n"), "line 2");
   expect_refused(write("d.csv", "id,x,y,radius_m\nA,1,nan,3\n"), "line 2");
   expect_refused(write("e.csv", "id,x,y,radius_m\nA,1,2,3\nA,4,5,3\n"), "every id once");
+  expect_refused(write("s.csv", "id,x,y,radius_m\nseen,1,2,3\n"), "plot seen: expected another id");
   expect_refused((folder_ / "none.csv").string(), "no such file");
   expect_refused(write("f.gpkg", "no database"), "expected sample plots");
 }

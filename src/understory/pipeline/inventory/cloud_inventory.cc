@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -249,14 +250,26 @@ const LayerFrame& layers_of(const Stock& stock, const LayerFrame& own) {
   return stock.of_run ? stock.frames.layers : own;
 }
 
-// Figures of the stand and of its plots. Throws InputError where no plot overlaps what was seen.
+// Figures of the stand and of its plots.
 void take_figures(const StandTableConfig& config, Stock& stock) {
   const LayerFrame own;
   stock.figures = take_stand(stock.inventory, config, stock.plots, layers_of(stock, own));
-  if (!stock.figures.no_overlap) return;
-  throw InputError(config.plots, "",
-                   fmt::format("expected plots where stems were seen: none of the {} overlaps {}",
-                               stock.plots.size(), stock.figures.seen_at));
+}
+
+// Before the work: plots of another place, or in another system. The frame of a run's layers may be
+// turned, so its plots are judged by what was seen.
+void check_plots_of(const StandTableConfig& config, const Stock& stock) {
+  if (stock.of_run || stock.plots.empty()) return;
+  Eigen::AlignedBox2d box;
+  if (stock.stand.streamed) {
+    const GroundArea extent = stock.stand.streamed->tiles->extent();
+    box = Eigen::AlignedBox2d(extent.low, extent.high);
+  } else {
+    for (const Eigen::Vector3f& point : stock.stand.cloud.points)
+      box.extend(point.head<2>().cast<double>());
+    box.translate(stock.stand.cloud.origin.head<2>());
+  }
+  refuse_plots_outside(config, stock.plots, box.min(), box.max());
 }
 
 // trees.csv, trees.gpkg, the rasters, and of plots plots.csv and plot_classes.csv.
@@ -294,6 +307,7 @@ void read_cloud_of(const InventoryRequest& request, const fs::path& work, Log& l
   // The map of a run is in metres, and what is wrong with it is a matter of trust.
   if (!stock.stand.doubt.empty() && !stock.of_run && !request.slice)
     throw InputError(stock.path.string(), "", "expected metres and z up: " + stock.stand.doubt);
+  check_plots_of(request.config.stand, stock);
 }
 
 InventoryResult inventory_of(const InventoryRequest& request, const Stock& stock,

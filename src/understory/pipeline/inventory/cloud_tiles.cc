@@ -159,6 +159,17 @@ void CloudTiles::records_in(const GroundArea& area, const RecordVisitor& visit) 
   }
 }
 
+GroundArea CloudTiles::extent() const {
+  GroundArea all{Eigen::Vector2d::Constant(GroundArea::kEndless),
+                 Eigen::Vector2d::Constant(-GroundArea::kEndless)};
+  for (const auto& [index, cell] : cells_) {
+    const GroundArea own = area_of(index);
+    all.low = all.low.cwiseMin(own.low);
+    all.high = all.high.cwiseMax(own.high);
+  }
+  return all;
+}
+
 double CloudTiles::thickness_m() const {
   return static_cast<double>(highest_ - lowest_);
 }

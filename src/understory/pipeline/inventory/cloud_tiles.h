@@ -61,6 +61,7 @@ class CloudTiles : public TiledCloud {
 
   [[nodiscard]] std::uint64_t points() const { return points_; }
   [[nodiscard]] float most_intensity() const { return most_intensity_; }
+  [[nodiscard]] GroundArea extent() const;   // box of the cells that hold points
   [[nodiscard]] double thickness_m() const;  // from the lowest to the highest point
   [[nodiscard]] double tile_m() const { return tile_cells_ * cell_m_; }
 

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "understory/pipeline/pipeline_constants.h"
+#include "understory/util/error.h"
 
 namespace understory {
 namespace {
@@ -86,6 +89,23 @@ Eigen::Vector4d box_of(const VisibleArea& seen) {
           seen.y0 + seen.rows * seen.cell_m};
 }
 
+// Corners of the cells of which something was seen, world frame; nothing where there is none.
+std::optional<Eigen::Vector4d> box_of_seen(const VisibleArea& seen) {
+  Eigen::Array4i box(seen.columns, seen.rows, 0, 0);
+  for (int row = 0; row < seen.rows; ++row) {
+    for (int column = 0; column < seen.columns; ++column) {
+      const auto cell = static_cast<std::size_t>(row) * static_cast<std::size_t>(seen.columns) +
+                        static_cast<std::size_t>(column);
+      if (seen.halves[cell] == 0 || seen.halves[cell] == VisibleArea::kBorder) continue;
+      box = {std::min(box[0], column), std::min(box[1], row), std::max(box[2], column + 1),
+             std::max(box[3], row + 1)};
+    }
+  }
+  if (box[2] == 0) return std::nullopt;
+  return Eigen::Vector4d(seen.x0, seen.y0, seen.x0, seen.y0) +
+         seen.cell_m * box.cast<double>().matrix();
+}
+
 // The box, along the axes of another frame, that holds a box.
 template <typename Change>
 std::pair<Eigen::Vector2d, Eigen::Vector2d> corners_of(const Eigen::Vector4d& box,
@@ -102,9 +122,10 @@ std::pair<Eigen::Vector2d, Eigen::Vector2d> corners_of(const Eigen::Vector4d& bo
 
 // Where plots would have to lie, in the frame in which they are given.
 std::string place_of(const VisibleArea& seen, const PlotFrame& frame) {
-  if (seen.empty()) return "nothing was seen";
-  const auto [low, high] = corners_of(
-      box_of(seen), [&](const Eigen::Vector2d& point) { return frame.from_world(point); });
+  const std::optional<Eigen::Vector4d> box = box_of_seen(seen);
+  if (!box) return "no place";
+  const auto [low, high] =
+      corners_of(*box, [&](const Eigen::Vector2d& point) { return frame.from_world(point); });
   const int decimals = frame.in_metres() ? 0 : 5;
   return fmt::format("x {:.{}f} to {:.{}f}, y {:.{}f} to {:.{}f}", low.x(), decimals, high.x(),
                      decimals, low.y(), decimals, high.y(), decimals);
@@ -167,11 +188,9 @@ void judge_plots(const std::vector<StandPlot>& plots, const StandTableConfig& co
   const StandPlot* none = nullptr;
   std::size_t in_part = 0;
   std::size_t without = 0;
-  bool any = false;
   for (const StandPlot& plot : plots) {
     if (plot.shape.kind == "cell") continue;
     const double share = plot.figures.seen_share;
-    any = any || share > 0.0;
     if (share >= kWhole) continue;
     if (share < config.least_seen) {
       ++without;
@@ -181,7 +200,6 @@ void judge_plots(const std::vector<StandPlot>& plots, const StandTableConfig& co
       if (least == nullptr || share < least->figures.seen_share) least = &plot;
     }
   }
-  result.no_overlap = !plots.empty() && !any;
   if (in_part > 0)
     result.remarks.push_back(
         fmt::format("{} beyond what was seen ({} of plot {}). The figures assume that the unseen "
@@ -200,6 +218,30 @@ void judge_plots(const std::vector<StandPlot>& plots, const StandTableConfig& co
 
 std::vector<PlotOutline> plots_of(const StandTableConfig& config, const std::string& system) {
   return config.plots.empty() ? std::vector<PlotOutline>{} : read_plots(config.plots, system);
+}
+
+void refuse_plots_outside(const StandTableConfig& config, const std::vector<PlotOutline>& plots,
+                          const Eigen::Vector2d& low, const Eigen::Vector2d& high) {
+  if (plots.empty()) return;
+  const auto touches = [&](const PlotOutline& plot) {
+    Eigen::AlignedBox2d box;
+    for (const PlaneRing& ring : plot.rings)
+      for (const Eigen::Vector2d& point : ring)
+        box.extend(point);
+    if (plot.rings.empty()) {
+      const Eigen::Vector2d reach = Eigen::Vector2d::Constant(plot.radius_m);
+      box = Eigen::AlignedBox2d(plot.centre - reach, plot.centre + reach);
+    }
+    return box.intersects(Eigen::AlignedBox2d(low, high));
+  };
+  if (std::any_of(plots.begin(), plots.end(), touches)) return;
+  throw InputError(
+      config.plots, "",
+      fmt::format(
+          "expected plots on the cloud, which lies at x {:.0f} to {:.0f}, y {:.0f} to "
+          "{:.0f}: {} outside of it",
+          low.x(), high.x(), low.y(), high.y(),
+          plots.size() == 1 ? "the plot lies" : fmt::format("all {} plots lie", plots.size())));
 }
 
 StandResult take_stand(const InventoryResult& inventory, const StandTableConfig& config,

@@ -16,7 +16,6 @@ struct StandResult {
   std::vector<std::string> remarks;
   // Why plots have no figures; empty: all have.
   std::string complaint;
-  bool no_overlap = false;  // of any plot with what was seen
   // Where stems were seen, in words, in the frame of the layers.
   std::string seen_at;
 };
@@ -25,6 +24,11 @@ struct StandResult {
 // Throws as read_plots.
 [[nodiscard]] std::vector<PlotOutline> plots_of(const StandTableConfig& config,
                                                 const std::string& system);
+
+// Throws InputError where every plot lies outside of the box of a cloud: `low` and `high` are in
+// the frame of the plots.
+void refuse_plots_outside(const StandTableConfig& config, const std::vector<PlotOutline>& plots,
+                          const Eigen::Vector2d& low, const Eigen::Vector2d& high);
 
 // Whether plots or grid cells are asked for.
 [[nodiscard]] inline bool asks_for_plots(const StandTableConfig& config) {

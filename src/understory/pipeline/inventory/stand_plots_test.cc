@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "understory/util/error.h"
+
 namespace understory {
 namespace {
 
@@ -70,11 +72,11 @@ TEST(StandPlots, PlotsBeyondWhatWasSeenAreTold) {
   ASSERT_EQ(part.remarks.size(), 1U);
   EXPECT_NE(part.remarks[0].find("% of plot B)"), std::string::npos) << part.remarks[0];
   EXPECT_TRUE(part.complaint.empty());
-  EXPECT_FALSE(part.no_overlap);
   const StandResult little = take_stand(slope(), {}, {circle("C", 50, 30, 9)}, world);
   EXPECT_NE(little.complaint.find("1 plot has no figures"), std::string::npos);
-  EXPECT_FALSE(little.no_overlap);
-  EXPECT_TRUE(take_stand(slope(), {}, {circle("D", 500, 30, 9)}, world).no_overlap);
+  // Bug: the range was that of the grid of cells, also where nothing was seen: x 0 to 60.
+  EXPECT_NE(little.complaint.find("Stems were seen at x 0 to 45, y 0 to 60"), std::string::npos)
+      << little.complaint;
 }
 
 // A plot in the wrong frame: the message says where it would have to lie, in the layers' own.
@@ -82,10 +84,29 @@ TEST(StandPlots, WhereStemsWereSeenIsToldInTheFrameOfTheLayers) {
   const LayerFrame moved(
       Pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(400'000.0, 6'800'000.0, 0.0)));
   const StandResult far = take_stand(slope(), {}, {circle("D", 20, 30, 9)}, moved);
-  EXPECT_TRUE(far.no_overlap);
   EXPECT_NE(far.complaint.find("(0 % of plot D)"), std::string::npos) << far.complaint;
   EXPECT_NE(far.complaint.find("x 400000 to"), std::string::npos) << far.complaint;
   EXPECT_NE(far.complaint.find("y 6800000 to"), std::string::npos) << far.complaint;
+}
+
+TEST(StandPlots, ThoseOfAnotherPlaceAreRefusedBeforeTheWork) {
+  const auto said = [](const std::vector<PlotOutline>& plots) {
+    try {
+      refuse_plots_outside({}, plots, {10.0, 20.0}, {40.0, 60.0});
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(said({}), "");
+  EXPECT_EQ(said({circle("A", 5, 30, 9)}), "");
+  EXPECT_EQ(said({circle("A", 500, 30, 9), circle("B", 20, 30, 9)}), "");
+  EXPECT_EQ(said({{"C", {}, 0.0, {{{0, 0}, {100, 0}, {100, 100}}}}}), "");
+  EXPECT_NE(said({circle("A", 500, 30, 9)}).find("y 20 to 60: the plot lies outside of it"),
+            std::string::npos);
+  EXPECT_NE(said({circle("A", 500, 30, 9), {"C", {}, 0.0, {{{0, 0}, {9, 0}, {9, 9}}}}})
+                .find("all 2 plots lie outside of it"),
+            std::string::npos);
 }
 
 TEST(StandPlots, AreDrawnInTheFrameOfTheLayers) {

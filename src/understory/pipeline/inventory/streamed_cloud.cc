@@ -133,10 +133,11 @@ std::optional<StreamedCloud> stream_las(ByteSource& file, const CloudTiling& til
   cloud.has_times = header.has_gps_time;
   cloud.has_intensity = true;
   Sorter sorter(cloud, changes);
-  read_las_points(file, header, log, [&](const LasPoint& point) {
+  const auto left_out = read_las_points(file, header, log, [&](const LasPoint& point) {
     progress.poll();
     sorter.add(point.position, point.intensity, point.gps_time);
   });
+  if (cloud.tiles->points() == 0 && cloud.about.not_finite == 0) refuse_all_noise(file, left_out);
   return end_cloud(std::move(cloud), file.name(), tiling.threads);
 }
 

@@ -48,13 +48,14 @@ PointCloudFile read_las_cloud(ByteSource& file, Log& log, const ProgressSink& pr
   const LasHeader header = read_las_header(file);
   PointCloudFile cloud = described_by(header);
   Collector collector(cloud, change);
-  read_las_points(file, header, log, [&](const LasPoint& point) {
+  const auto left_out = read_las_points(file, header, log, [&](const LasPoint& point) {
     progress.poll();
     if (!collector.add(point.position)) return;
     cloud.intensity.push_back(point.intensity);
     cloud.classification.push_back(point.classification);
     if (header.has_gps_time) cloud.gps_time.push_back(point.gps_time);
   });
+  if (cloud.points.empty() && cloud.not_finite == 0) refuse_all_noise(file, left_out);
   return cloud;
 }
 

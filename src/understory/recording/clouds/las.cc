@@ -462,8 +462,8 @@ LasHeader read_las_header(ByteSource& file) {
   return header;
 }
 
-void read_las_points(ByteSource& file, const LasHeader& header, Log& log,
-                     const std::function<void(const LasPoint&)>& visit) {
+std::uint64_t read_las_points(ByteSource& file, const LasHeader& header, Log& log,
+                              const std::function<void(const LasPoint&)>& visit) {
   std::uint64_t left_out = 0;
   const auto visit_used = [&](const LasPoint& point) {
     const bool noise = point.classification == kLowNoise || point.classification == kHighNoise;
@@ -482,6 +482,12 @@ void read_las_points(ByteSource& file, const LasHeader& header, Log& log,
     log.warn("recording.noise",
              file.name() + ": " + std::to_string(left_out) +
                  " points are left out: they are withheld, or of the classes noise (7, 18)");
+  return left_out;
+}
+
+void refuse_all_noise(const ByteSource& file, std::uint64_t left_out) {
+  if (left_out > 0)
+    throw InputError(file.name(), "", "all points are classed as noise (7, 18) or withheld");
 }
 
 }  // namespace understory

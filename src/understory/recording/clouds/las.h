@@ -47,8 +47,11 @@ struct LasPoint {
 // Calls `visit` for each point that may be used; memory does not depend on their number. Points of
 // the classes noise (7, 18) and withheld ones are left out with a warning ("recording.noise").
 // Files of this program keep them: it finds its noise anew. Where the points break off there is a
-// warning ("recording.damaged"). Throws InputError if there is not one.
-void read_las_points(ByteSource& file, const LasHeader& header, Log& log,
-                     const std::function<void(const LasPoint&)>& visit);
+// warning ("recording.damaged"). Throws InputError if there is not one. Returns how many were left
+// out as noise or withheld.
+std::uint64_t read_las_points(ByteSource& file, const LasHeader& header, Log& log,
+                              const std::function<void(const LasPoint&)>& visit);
+// Throws InputError for a file of which read_las_points left all points out.
+void refuse_all_noise(const ByteSource& file, std::uint64_t left_out);
 
 }  // namespace understory
