@@ -65,6 +65,38 @@ def check_map(browser):
     assert colours > 20, colours
 
 
+def check_legend(browser):
+    """A tree has the colours of the map in the legend too."""
+    colours = "((q, p) => getComputedStyle(document.querySelector(q))[p])"
+    kinds = browser.run("[...new Set([...document.querySelectorAll('.legend .dot')].map((i) => i.classList[1]))]")
+    assert "sure" in kinds and len(kinds) > 1, kinds
+    for kind in kinds:
+        ring, fill = (browser.run(f"{colours}('.legend .{kind}', '{p}')") for p in ("borderTopColor", "backgroundColor"))
+        map_ring, map_fill = (browser.run(f"{colours}('.trees .{kind}', '{p}')") for p in ("stroke", "fill"))
+        assert fill == map_fill, (kind, fill, map_fill)
+        assert ring == (map_fill if kind == "weak" else map_ring), (kind, ring, map_ring)
+
+
+def check_place_of_buttons_and_numbers(browser):
+    """No button lies on the map, and no two numbers of the grid lie on each other, however it is moved."""
+    assert browser.run(
+        "(() => { const map = document.querySelector('canvas').getBoundingClientRect();"
+        "return [...document.querySelectorAll('.buttons button')].every("
+        "(b) => b.getBoundingClientRect().bottom <= map.top); })()")
+    overlaps = browser.run(
+        "(() => { const { painter, view } = selection.map; const write = painter.write; const boxes = [];"
+        "painter.write = (text, x, y, font, align) => { if (!/^[EN] /.test(text)) return; painter.pen.font = font;"
+        "const wide = painter.pen.measureText(text).width; const left = align === 'center' ? x - wide / 2 : x;"
+        "boxes.push([left, y - 11, left + wide, y]); };"
+        "let over = 0; const meet = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];"
+        "painter.map.grid = true;"
+        "for (let k = 0; k < 400; k += 1) { boxes.length = 0; painter.map.north = k % 2;"
+        "painter.paint({ scale: view.scale * 3, x: view.x + 0.7 * k, y: view.y + 0.9 * k });"
+        "boxes.forEach((a, i) => boxes.slice(i + 1).forEach((b) => { over += meet(a, b); })); }"
+        "painter.write = write; return over; })()")
+    assert overlaps == 0, overlaps
+
+
 def check_crowns(browser):
     """A box draws the outlines of all crowns; that of the chosen tree is always there."""
     count = "(c => { const all = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;" \
@@ -165,7 +197,9 @@ with tempfile.TemporaryDirectory() as scratch:
         browser.wait()
         assert browser.errors() == [], browser.errors()
         assert len(browser.requests()) == 1, browser.requests()
+        check_legend(browser)
         check_map(browser)
+        check_place_of_buttons_and_numbers(browser)
         check_table(browser)
         check_sheets(browser)
         check_print(browser, scratch / "report.pdf")

@@ -314,7 +314,11 @@ std::string distrust_section(const ReportInput& input) {
   std::string items;
   const auto add = [&](const std::string& what, const std::string& meaning) {
     items += "<li>" + escape_html(what);
-    if (!meaning.empty()) items += " <span class=\"so\">" + escape_html(meaning) + "</span>";
+    if (!meaning.empty()) {
+      const bool ended = !what.empty() && std::string(".!?").find(what.back()) != std::string::npos;
+      items += (ended ? " <span class=\"so\">" : ". <span class=\"so\">") + escape_html(meaning) +
+               "</span>";
+    }
     items += "</li>";
   };
   for (const Log::Warning& warning : input.summary.warnings) {

@@ -212,6 +212,7 @@ std::string grid_svg(const MapView& view) {
     return all;
   };
   const double longer = std::max(view.width, view.height);
+  constexpr double kTopStrip = 19.0;  // where the numbers to the east stand
   std::string lines;
   std::string numbers;
   for (const double east : ticks(view.x0, view.width, longer)) {
@@ -223,7 +224,9 @@ std::string grid_svg(const MapView& view) {
   for (const double north : ticks(view.y0, view.height, longer)) {
     const double y = view.y(north);
     lines += fmt::format("M0 {:.1f}H{:.1f}", y, width);
-    numbers += fmt::format("<text x=\"4\" y=\"{:.1f}\">N {:.0f}</text>", y - 4.0, north);
+    // Above its line, but below the numbers to the east.
+    const double base = y < kTopStrip + 15.0 ? std::max(y, kTopStrip) + 15.0 : y - 4.0;
+    numbers += fmt::format("<text x=\"4\" y=\"{:.1f}\">N {:.0f}</text>", base, north);
   }
   return fmt::format(
       "<g class=\"grid\"><path d=\"{}\" fill=\"none\" stroke=\"#111\" stroke-width=\"0.7\" "

@@ -40,7 +40,7 @@ svg.plot{max-width:1100px}svg.plot text{fill:var(--soft);font-size:12px}
 figure{margin:0}figcaption{font-size:.85rem;color:var(--soft);margin-top:4px}
 .legend{font-size:.88rem;color:var(--soft);margin:.5rem 0 0}.legend span{white-space:nowrap;
 margin-right:12px}.legend i{display:inline-block;width:22px;height:0;border-top:4px solid;margin:0 5px 3px 0}
-.legend i.dot{width:11px;height:11px;border:2px solid;
+.legend i.dot{width:11px;height:11px;border-width:2px;border-style:solid;
 border-radius:50%;margin-bottom:-1px}.legend i.box{width:13px;height:13px;border:0;margin-bottom:-2px}
 table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
 th,td{text-align:left;padding:3px 14px 3px 0;border-bottom:1px solid var(--rule);vertical-align:top}

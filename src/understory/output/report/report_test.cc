@@ -225,6 +225,40 @@ TEST(Report, TellsWhatTheDistanceOfMatchedPointsIs) {
   EXPECT_EQ(report_html(input).find("for each cube"), std::string::npos);
 }
 
+// "... to tell the heading The layers are in a local frame" was one sentence.
+TEST(Report, AWarningEndsBeforeItsConsequenceBegins) {
+  ReportInput input;
+  Log log;
+  log.warn("gnss.not_placed", "expected 5 m at least");
+  log.warn("imu.silent", "It was silent.");
+  input.summary.warnings = log.warnings();
+  const std::string html = report_html(input);
+  EXPECT_NE(html.find("5 m at least. <span class=\"so\">The layers are"), std::string::npos);
+  EXPECT_NE(html.find("It was silent. <span class=\"so\">In such gaps"), std::string::npos);
+}
+
+// A map whose northing lines lie near its top wrote "N" over "E" in the upper left corner.
+TEST(Report, NumbersOfTheGridStandApart) {
+  const GeodeticPlace place{61.2, 25.1, 150.0};
+  const LayerFrame frame(Pose(), place, "EPSG:32635");
+  ReportInput input;
+  input.scans.resize(2);
+  input.drawing = &frame;
+  input.north_is_up = true;
+  std::size_t lines = 0;
+  for (float north = 40.0F; north < 60.0F; north += 1.0F) {
+    input.scans[1].position = {95.0F, north, 0.0F};
+    const std::string html = report_html(input);
+    const std::string norths = "<text x=\"4\" y=\"";
+    for (std::size_t at = html.find(norths); at != std::string::npos;
+         at = html.find(norths, at + 1)) {
+      ++lines;
+      EXPECT_GE(std::stod(html.substr(at + norths.size())), 34.0) << north;
+    }
+  }
+  EXPECT_GT(lines, 20U);
+}
+
 // Every figure at the top is explained below it.
 TEST(Report, EachFigureHasItsMeaning) {
   const std::string html = report_html(run_with_loops(1, 0, 0));

@@ -84,7 +84,7 @@ function startMap(svg) {
   canvas.style.aspectRatio = map.width + ' / ' + map.height;
   const told = makeElement('p', { class: 'told', 'aria-live': 'polite' });
   const buttons = makeElement('div', { class: 'buttons' });
-  frame.append(canvas, buttons, told);
+  frame.append(buttons, canvas, told);
   svg.before(frame);
   svg.classList.add('still');
   const hint = 'Drag to move, wheel or two fingers to zoom, click on a tree to find it in the table.';

@@ -6,6 +6,7 @@ const kCrowdedRadius = 1.1; // pixels: the same where trees stand close to each 
 const kCrowdedShare = 0.2; // of the mean distance of trees on the screen
 const kLabelScale = 7; // pixels per metre from which on trees show their numbers
 const kMostLabels = 400;
+const kTopStrip = 18; // pixels at the top, where the numbers to the east stand
 
 // 1, 2 or 5 times a power of ten, at most `most`.
 function roundLength(most) {
@@ -291,7 +292,8 @@ class MapPainter {
       pen.strokeStyle = 'rgba(17,17,17,.35)';
       pen.lineWidth = 0.7;
       pen.strokeRect(x, -5, 0, this.height + 10);
-      this.write('E ' + east.toFixed(digits), x, 14, '12px', 'center');
+      // Not below the north arrow.
+      if (!map.north || x < this.width - 64) this.write('E ' + east.toFixed(digits), x, 14, '12px', 'center');
     }
     for (let line = Math.floor(north / step) * step; ; line -= step) {
       const y = ((map.y(0) - line) / (map.y(0) - map.y(1)) - view.y) * view.scale;
@@ -299,8 +301,9 @@ class MapPainter {
       pen.strokeStyle = 'rgba(17,17,17,.35)';
       pen.lineWidth = 0.7;
       pen.strokeRect(-5, y, this.width + 10, 0);
-      // Beside the buttons, and not below the scale bar.
-      if (y < this.height - 44) this.write('N ' + line.toFixed(digits), y < 150 ? 56 : 4, y - 4, '12px', 'left');
+      // Above the line, but below the numbers to the east. None where the scale bar is.
+      const base = y < kTopStrip + 14 ? Math.max(y + 14, kTopStrip + 14) : y - 4;
+      if (y < this.height - 44) this.write('N ' + line.toFixed(digits), 4, base, '12px', 'left');
     }
   }
 
