@@ -4,6 +4,7 @@ system. Read with laspy, GDAL's tools where they are installed, and SQLite, and 
 import csv
 import json
 import math
+import re
 import shutil
 import sqlite3
 import struct
@@ -276,6 +277,30 @@ def again(folder):
         assert "without satellite positions" not in page and "Nothing stood out" not in page
         world = facts_of(folder / name)
         assert world["georeference"]["enu_from_world"]["translation_m"] == [0, 0, 0], world["georeference"]
+        check_stand(RUN, folder / name)
+    done = program("georeference", folder / "kept", "--method", "auto", "-o", folder / "twice")
+    assert done.returncode == FIRST.returncode, done.stderr
+    check_stand(folder / "kept", folder / "twice")
+
+
+def check_stand(run, moved):
+    """What is told of the stand does not change where it is moved, and the page says what it does not hold."""
+    before, after = facts_of(run), facts_of(moved)
+    for name in ("area_m2", "seen_area_m2", "stems_per_ha", "stems_per_ha_sd", "basal_area_m2_per_ha", "mean_dbh_m"):
+        assert after["quality"][name] == before["quality"][name], name
+    for name in ("trees_in_seen_area", "diameters_doubtful", "look_again_places"):
+        assert after["counts"][name] == before["counts"][name], name
+    pages = [(folder / "report.html").read_text() for folder in (run, moved)]
+    for label in ("area seen (not a plot's border)", "stems per hectare", "basal area, m² per hectare"):
+        shown = [re.search(f"<b>([^<]*)</b><span>{re.escape(label)}</span>", page.replace("&#39;", "'")) for page in pages]
+        assert shown[0] and shown[1] and shown[0][1] == shown[1][1], (label, shown)
+    assert "stems per hectare seen" not in pages[1] and "<h2>Stand figures</h2>" in pages[1]
+    for note in before["notes"]:
+        assert note.split(". See")[0] in pages[1].replace("&gt;", ">"), note
+    kept = [w for w in before["warnings"] if not w["key"].startswith(("gnss", "georeference"))]
+    assert [w for w in after["warnings"] if w in kept] == kept, (kept, after["warnings"])
+    left = [name for name in ("states.csv.gz", "graph.g2o", "global.csv.gz") if (run / name).exists()]
+    assert all(f"<code>{name}</code>" in pages[1] for name in left), left
 
 
 cases.run()

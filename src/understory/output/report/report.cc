@@ -25,7 +25,7 @@ std::string report_html(const ReportInput& input, const std::vector<std::string>
   html += plots_section(input);
   html += stand_section(input);
   html += deformation_section(input);
-  html += files_section(files);
+  html += files_section(input, files);
   html += truth_section(input);
   html += loops_section(input);
   html += correction_section(input);

@@ -121,7 +121,7 @@ struct ReportInput {
   RunSummary summary;
   const MapPicture* picture = nullptr;         // not owned
   const InventoryResult* inventory = nullptr;  // not owned
-  const StandTable* stand = nullptr;           // not owned; of an inventory
+  const StandTable* stand = nullptr;           // not owned; of an inventory, or of `trees`
   const std::vector<Tree>* trees = nullptr;    // not owned; without an inventory
   std::vector<TreeFall> falls;                 // of these trees
   std::vector<ReportScan> scans;
@@ -143,6 +143,7 @@ struct ReportInput {
   bool has_fixes = false;               // of a GNSS receiver
   // Of a run that was moved: how its scans were matched stands in its own report.
   bool moved = false;
+  std::vector<std::string> not_moved;  // names of its results that only its own folder has
   // Of `trees` without an inventory: they come from a cloud, so that heights are measured.
   bool trees_of_cloud = false;
   double area_m2 = 0.0;  // squares with points, of these trees; 0: unknown

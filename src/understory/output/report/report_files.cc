@@ -16,10 +16,12 @@ struct ResultFile {
 };
 
 // In the order in which a user wants them; docs/reference/outputs.md has their columns.
-constexpr std::array<ResultFile, 30> kResultFiles = {
+constexpr std::array<ResultFile, 32> kResultFiles = {
     {{"trees.csv", "one row a tree: place, diameter, height", "a spreadsheet, QGIS"},
      {"stem_curves.csv", "diameters along each stem", "a spreadsheet"},
      {"dead_wood.csv", "stumps and lying stems", "a spreadsheet"},
+     {"plots.csv", "figures of the stand and of its plots", "a spreadsheet"},
+     {"plot_classes.csv", "stems of each class of diameters", "a spreadsheet"},
      {"map.qgs", "all layers of this folder on one map", "QGIS: double-click"},
      {"trees.gpkg", "the same trees as points on a map, the path, and places to walk to",
       "QGIS: drag the file into the window"},
@@ -52,9 +54,18 @@ constexpr std::array<ResultFile, 30> kResultFiles = {
      {"deformation.csv", "by how much one map was bent onto the other", "a spreadsheet"},
      {"report.html", "this page", "a browser"}}};
 
+// What of a run that was moved lies in its own folder alone.
+std::string left_behind(const std::vector<std::string>& names) {
+  if (names.empty()) return "";
+  std::string list;
+  for (const std::string& name : names)
+    list += (list.empty() ? "<code>" : ", <code>") + escape_html(name) + "</code>";
+  return "<p>Only the folder of the run that was moved holds " + list + ".</p>";
+}
+
 }  // namespace
 
-std::string files_section(const std::vector<std::string>& files) {
+std::string files_section(const ReportInput& input, const std::vector<std::string>& files) {
   std::string rows;
   for (const ResultFile& file : kResultFiles) {
     if (std::find(files.begin(), files.end(), file.name) == files.end()) continue;
@@ -66,7 +77,7 @@ std::string files_section(const std::vector<std::string>& files) {
          "class=\"wide\"><table class=\"files\"><thead><tr><th>file</th><th>what it "
          "holds</th><th>open it "
          "with</th></tr></thead><tbody>" +
-         rows + "</tbody></table></div></section>\n";
+         rows + "</tbody></table></div>" + left_behind(input.not_moved) + "</section>\n";
 }
 
 }  // namespace understory

@@ -265,12 +265,11 @@ std::string verdict_section(const ReportInput& input) {
 
 std::string figures_section(const ReportInput& input) {
   Tiles tiles;
-  if (input.inventory != nullptr) {
+  if (input.inventory != nullptr || (input.trees != nullptr && input.trees_of_cloud)) {
     const bool seen = input.stand != nullptr && input.stand->seen.trees > 0;
-    add_stand(tiles, input.inventory->trees, seen ? 0.0 : input.inventory->area_m2);
+    const double area_m2 = input.inventory != nullptr ? input.inventory->area_m2 : input.area_m2;
+    add_stand(tiles, *report_trees(input), seen ? 0.0 : area_m2);
     if (seen) add_figures(tiles, input.stand->seen);
-  } else if (input.trees != nullptr && input.trees_of_cloud) {
-    add_stand(tiles, *input.trees, input.area_m2);
   } else if (input.trees != nullptr) {
     tiles.add(count_text(input.trees->size()), "trees",
               "Trees whose stem was seen in many of the scans that could see it.");

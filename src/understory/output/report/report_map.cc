@@ -14,6 +14,11 @@
 namespace understory {
 namespace {
 
+// What the map of a run that was moved does not show.
+constexpr const char* kOfMoved =
+    "<p class=\"sub\">The map of the run before it was moved also shows thin coverage, places to "
+    "walk to and dead wood. What it has of the last two is in layers of trees.gpkg here.</p>";
+
 // How a scan's match is drawn.
 enum class Match { kGood, kWeak, kLost };
 
@@ -338,7 +343,7 @@ std::string map_section(const ReportInput& input) {
   const MapView view = map_view(input);
   return "<section><h2>The map from above</h2>" + map_svg(input, view) + map_legend(input) +
          (input.inventory == nullptr ? std::string() : look_list(*input.inventory, view)) +
-         "</section>\n";
+         (input.moved && input.trees_of_cloud ? kOfMoved : "") + "</section>\n";
 }
 
 }  // namespace understory

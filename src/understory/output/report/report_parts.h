@@ -30,8 +30,9 @@ namespace understory {
 [[nodiscard]] std::string sheets_part(const InventoryResult& inventory);
 // The figures of the stand and of its sample plots.
 [[nodiscard]] std::string plots_section(const ReportInput& input);
-// What lies beside the report and how to open it; `files`: names.
-[[nodiscard]] std::string files_section(const std::vector<std::string>& files);
+// What lies beside the report and how to open it, and what of a run was not moved; `files`: names.
+[[nodiscard]] std::string files_section(const ReportInput& input,
+                                        const std::vector<std::string>& files);
 [[nodiscard]] std::string matching_section(const ReportInput& input);
 [[nodiscard]] std::string loops_section(const ReportInput& input);
 [[nodiscard]] std::string correction_section(const ReportInput& input);

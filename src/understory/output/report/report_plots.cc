@@ -89,7 +89,7 @@ std::string filled_in(const StandTable& stand) {
         " Heights and volumes are <b>lower bounds</b>: the tops of {} of {} trees were not seen, "
         "and too few others show theirs for a height curve.",
         seen.heights_lower_bounds, seen.trees);
-  if (seen.volumes_filled_in > 0)
+  if (seen.volumes_filled_in > 0 && std::isfinite(stand.form_factor))
     html += fmt::format(
         " {} volumes are basal area times height times {:.2f}, the form factor of the others.",
         seen.volumes_filled_in, stand.form_factor);

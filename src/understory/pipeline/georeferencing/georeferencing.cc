@@ -12,6 +12,8 @@
 #include "understory/pipeline/georeferencing/movable_run.h"
 #include "understory/pipeline/run_folder/run_documents.h"
 #include "understory/pipeline/run_folder/run_folder.h"
+#include "understory/pipeline/run_folder/run_json.h"
+#include "understory/pipeline/run_folder/run_results.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/config/config.h"
 #include "understory/util/error.h"
@@ -89,7 +91,6 @@ void describe(const GeoreferenceRequest& request, const MovedRun& moved, RunDocu
   report.made_from = fmt::format("a run of {} poses, moved by one motion", run.trajectory.size());
   report.moved = true;
   report.trees_of_cloud = run.of_cloud;
-  report.area_m2 = run.area_m2;
   report.has_fixes = !placement.gnss.empty();
   if (run.has_trees) {
     documents.count("trees", moved.trees.size());
@@ -104,6 +105,24 @@ void describe(const GeoreferenceRequest& request, const MovedRun& moved, RunDocu
     report.scans.push_back(scan);
   }
   report.fixes = fixes_of(placement.gnss);
+}
+
+// What stays true of the stand wherever it lies. Results that cannot be moved are named.
+void describe_carried(const GeoreferenceRequest& request, const CarriedStand& stand,
+                      RunDocuments& documents) {
+  RunSummary& summary = documents.summary();
+  summary.counts.insert(stand.counts.begin(), stand.counts.end());
+  summary.quality.insert(stand.quality.begin(), stand.quality.end());
+  summary.notes = stand.notes;
+  for (const Log::Warning& warning : stand.warnings)
+    documents.remark(warning);
+  ReportInput& report = documents.report();
+  report.area_m2 = stand.area_m2;
+  if (stand.table) report.stand = &*stand.table;
+  for (const std::string& name : result_names())
+    if (fs::exists(request.run / name) && !fs::exists(request.result / name) &&
+        name != RunJson::kName && name != "report.html")
+      report.not_moved.push_back(name);
 }
 
 Placement find_placement(const GeoreferenceRequest& request, const MovableRun& run, Log& log) {
@@ -185,6 +204,7 @@ GeoreferenceOutcome run_georeferencing(const GeoreferenceRequest& given, Log& lo
   write_moved_run({request.run, request.result, progress}, moved, frames, picture, log);
   timer.reset();
   describe(request, moved, documents);
+  describe_carried(request, run.stand, documents);
   documents.place(std::move(on_globe), frames);
   if (!picture.empty()) documents.report().picture = &picture;
   progress.poll();

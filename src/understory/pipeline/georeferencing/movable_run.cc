@@ -9,7 +9,7 @@
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/head_cut_log.h"
 #include "understory/pipeline/georeferencing/moved_layers.h"
-#include "understory/pipeline/run_folder/run_json.h"
+#include "understory/pipeline/georeferencing/moved_tables.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -55,8 +55,7 @@ MovableRun read_movable_run(const fs::path& folder) {
   run.second_antenna_in_body = read_second_antenna(folder);
   run.layers = std::make_shared<LayerFrame>(read_layer_frame(folder));
   run.of_cloud = fs::exists(folder / "map.laz") || fs::exists(folder / "dtm.tif");
-  const double area_m2 = RunJson(folder).find_number("/quality/area_m2");
-  run.area_m2 = std::isnan(area_m2) ? 0.0 : area_m2;
+  run.stand = read_carried_stand(folder);
   run.trust = trust_of_run(folder);
   return run;
 }
@@ -86,6 +85,7 @@ void write_moved_run(const MovingFolders& folders, const MovedRun& moved,
                            "trajectory_partial.tum"})
     write_moved_path(from / name, to / name, motion);
   write_moved_cuts(from / "cuts.csv", to / "cuts.csv", motion);
+  write_moved_tables(from, to, run.trees, motion);
   copy_unmoved(from, to);
   if (run.has_trees) write_trees_csv(to / "trees.csv", moved.trees);
   if (run.has_falls) write_tree_falls(to / "felled.csv", placed(run.falls, moved.trees));

@@ -12,6 +12,7 @@
 #include "understory/georeference/systems/geodetic.h"
 #include "understory/georeference/systems/layer_frame.h"
 #include "understory/output/report/map_picture.h"
+#include "understory/pipeline/georeferencing/carried_stand.h"
 #include "understory/pipeline/georeferencing/methods/placement.h"
 #include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/pipeline/judgement/inherited_trust.h"
@@ -41,7 +42,7 @@ struct MovableRun {
   // The frame that its layers are in: map.laz, dtm.tif and chm.tif.
   std::shared_ptr<const LayerFrame> layers = std::make_shared<LayerFrame>();
   bool of_cloud = false;  // it has a cloud, so that heights of trees are measured
-  double area_m2 = 0.0;   // squares with points; 0: unknown
+  CarriedStand stand;
   InheritedTrust trust;
 };
 

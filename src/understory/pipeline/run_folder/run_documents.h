@@ -48,6 +48,8 @@ class RunDocuments {
   // Adds what a user has to know of the result and no part of the program has warned of before. It
   // stands under "warnings", beside those of the log, and in the report.
   void remark(const std::string& key, const std::string& message);
+  // The same of what a run has warned of that this command goes on from.
+  void remark(const Log::Warning& warning) { remarks_.push_back(warning); }
   // Where the run lies on the globe, and the frame that its map is drawn in. `frames` must live
   // until `write`.
   void place(RunPlace place, const ResultFrames& frames);
