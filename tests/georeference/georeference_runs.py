@@ -279,6 +279,14 @@ def levelled(folder):
     origin = json.loads((folder / "level" / "run.json").read_text())["quality"]["origin_height_m"]
     assert abs(mean + origin - (HEIGHT - 18.0)) < 0.15, (mean, origin)
     assert after < 0.1 and 4 * after < before, (before, after)
+    # Place and heading stay, and so does how sure they are.
+    placed, level = (json.loads((run / "run.json").read_text())["georeference"] for run in (PLACED, folder / "level"))
+    assert placed["heading_sd_deg"] > 0 and level["heading_sd_deg"] == placed["heading_sd_deg"], (placed, level)
+    assert level["expected_error_m"] == placed["expected_error_m"], (placed, level)
+    assert told["sd_heading_deg"] == placed["heading_sd_deg"], told
+    done = georeference(PLACED, "--method", "terrain", "--dem", DEM, "-o", folder / "moved", "--json", "--yaw-sd-deg", 3)
+    moved = json.loads((folder / "moved" / "run.json").read_text())["georeference"]
+    assert done.returncode == 0 and moved["heading_sd_deg"] is None, (done.stderr, moved)
     return f"height of the path {100 * before:.0f} -> {100 * after:.0f} cm"
 
 

@@ -153,8 +153,7 @@ RunPlace place_of(const GeoreferenceRequest& request, const MovableRun& run,
   place.on_globe = placement.origin.has_value();
   if (place.on_globe) {
     place.origin = *placement.origin;
-    place.heights = request.terrain_model.empty() ? other_heights(placement)
-                                                  : "as the terrain model counts them";
+    place.heights = request.terrain_model.empty() ? other_heights(placement) : kHeightsOfModel;
   } else {
     place.reason =
         "the map that it was laid on has no coordinate system, or none that the run is known in";

@@ -50,6 +50,9 @@ MovableRun read_movable_run(const fs::path& folder) {
   if (const std::optional<RunPlace> place = read_run_place(folder)) {
     run.origin = place->origin;
     run.enu_from_world = place->enu_from_world;
+    run.heights = place->heights;
+    run.expected_error_m = place->expected_error_m;
+    run.heading_sd_deg = place->heading_sd_deg;
   }
   run.antenna_in_body = read_antenna(folder);
   run.second_antenna_in_body = read_second_antenna(folder);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -36,6 +37,10 @@ struct MovableRun {
   // not known.
   std::optional<GeodeticPlace> origin;
   Pose enu_from_world;
+  std::string heights;  // what those of its layers are above, in words
+  // How sure that place is, as its method told it; NaN where not known.
+  double expected_error_m = std::numeric_limits<double>::quiet_NaN();
+  double heading_sd_deg = std::numeric_limits<double>::quiet_NaN();
   std::vector<GnssFix> fixes;  // of a run that is being mapped; else in its gnss.csv
   std::optional<Eigen::Vector3d> antenna_in_body;  // of these fixes, metres; not where unknown
   std::optional<Eigen::Vector3d> second_antenna_in_body;

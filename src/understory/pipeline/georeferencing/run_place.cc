@@ -34,6 +34,8 @@ std::optional<RunPlace> place_of(const RunJson& json) {
                   json.get_number("/georeference/origin/longitude_deg"),
                   json.get_number("/georeference/origin/height_m")};
   place.enu_from_world = json.get_pose("/georeference/enu_from_world");
+  place.expected_error_m = json.find_number("/georeference/expected_error_m");
+  place.heading_sd_deg = json.find_number("/georeference/heading_sd_deg");
   return place;
 }
 

@@ -5,6 +5,18 @@
 #include "understory/util/error.h"
 
 namespace understory {
+namespace {
+
+// Where only height and tilt are fitted, place and heading stay as sure as they were.
+void keep_certainty(const MovableRun& run, Placement& placement) {
+  if (std::isfinite(run.expected_error_m)) {
+    placement.expected_error_m = run.expected_error_m;
+    placement.figures["expected_error_m"] = run.expected_error_m;
+  }
+  if (std::isfinite(run.heading_sd_deg)) placement.figures["sd_heading_deg"] = run.heading_sd_deg;
+}
+
+}  // namespace
 
 Placement place_by_terrain(const GeoreferenceRequest& request, const MovableRun& run,
                            Log& /*log*/) {
@@ -21,6 +33,8 @@ Placement place_by_terrain(const GeoreferenceRequest& request, const MovableRun&
         Eigen::Vector3d(x_m, y_m, 0.0));
   } else {
     placement.origin = run.origin;
+    if (request.terrain.place_sd_m == 0.0 && request.terrain.yaw_sd_deg == 0.0)
+      keep_certainty(run, placement);
   }
   const LevelledRun levelled = level_run(request, run, placed, placement.origin, request.terrain);
   placement.target_from_world = levelled.target_from_world;

@@ -36,6 +36,7 @@ struct Placement {
   double expected_error_m = std::numeric_limits<double>::quiet_NaN();
   std::vector<PlacementResidual> residuals;  // of things other than fixes
   std::optional<GeodeticPlace> origin;       // of the target frame, where that is east, north, up
+  std::string heights;  // what they count from, where it is not the ellipsoid and no fix says so
   std::vector<InputHash> inputs;          // files that it was computed from, beside the run's own
   std::vector<GnssRow> gnss;              // the fixes as used, for gnss.csv
   std::map<std::string, Figure> figures;  // for run.json
@@ -45,9 +46,13 @@ struct Placement {
   void doubt(const std::string& reason) { doubts.push_back(reason); }
 };
 
+// Beginnings of what a run says of heights that are not above the ellipsoid.
+inline constexpr const char* kHeightsOfModel = "as the terrain model counts them";
+inline constexpr const char* kHeightsOfOrigin = "above the origin of the run";
 // What an error says, without the file that it names first.
 [[nodiscard]] std::string reason_of(const InputError& error);
-// What heights are above where it is not the ellipsoid: no fix may have a height. Else empty.
+// What heights are above where it is not the ellipsoid: no fix may have a height, nor the map of
+// trees. Else empty.
 [[nodiscard]] std::string other_heights(const Placement& placement);
 // Standard deviation of the heading, degrees; NaN where the method does not tell it.
 [[nodiscard]] double heading_sd_deg(const Placement& placement);

@@ -48,10 +48,11 @@ std::string reason_of(const InputError& error) {
 }
 
 std::string other_heights(const Placement& placement) {
+  if (!placement.heights.empty()) return placement.heights;
   const bool told = placement.gnss.empty() ||
                     std::any_of(placement.gnss.begin(), placement.gnss.end(),
                                 [](const GnssRow& row) { return std::isfinite(row.fix.height_m); });
-  return told ? "" : "above the origin of the run, as no fix has a height";
+  return told ? "" : std::string(kHeightsOfOrigin) + ", as no fix has a height";
 }
 
 double heading_sd_deg(const Placement& placement) {
