@@ -135,6 +135,38 @@ def national(folder):
     return f"{first['trees_paired']} pairs, {first['trees_apart_rms_m']:.2f} m apart"
 
 
+def without_ground(path, to):
+    to.write_text("\n".join(",".join(row.split(",")[:2] + row.split(",")[3:])
+                            for row in path.read_text().splitlines()) + "\n")
+    return to
+
+
+@cases.case("a map without ground leaves the heights of a run on the earth, and else says that they are local")
+def heights_stay(folder):
+    grid = write_map(folder / "grid.csv", from_air(FOREST), EAST, NORTH)
+    bare = without_ground(grid, folder / "bare.csv")
+    more = ("--tree-map-crs", "EPSG:3067", "--crs", "EPSG:3067", "--near", EAST + 100, NORTH - 50)
+    done = by_trees(RUN, grid, folder / "placed", *more)
+    assert done.returncode == 0, done.stderr
+    done = by_trees(folder / "placed", bare, folder / "kept", *more)
+    assert done.returncode == 0, done.stderr
+    facts = {name: json.loads((folder / name / "run.json").read_text()) for name in ("placed", "kept")}
+    feet = {}
+    for name, told in facts.items():
+        with (folder / name / "trees.csv").open() as file:
+            heights = [float(row["z"]) for row in csv.DictReader(file)]
+        feet[name] = told["georeference"]["origin"]["height_m"] + sum(heights) / len(heights)
+    assert abs(feet["kept"] - feet["placed"]) < 0.05 and feet["kept"] > 100, feet
+    assert facts["kept"]["georeference"]["heights"] == facts["placed"]["georeference"]["heights"], facts
+    done = by_trees(RUN, bare, folder / "local", *more)
+    told = json.loads((folder / "local" / "run.json").read_text())
+    assert "georeference.local_heights" in [w["key"] for w in told["warnings"]], told["warnings"]
+    assert "above the origin of the run" in told["georeference"]["heights"], told["georeference"]
+    done = by_trees(folder / "local", bare, folder / "again", *more)
+    again = json.loads((folder / "again" / "run.json").read_text())
+    assert again["georeference"]["heights"] == told["georeference"]["heights"], again["georeference"]
+
+
 @cases.case("threads make no difference")
 def threads(folder):
     for threads in (1, 2):
@@ -169,6 +201,7 @@ def bad(folder):
             ("far", RUN, grid, ("--tree-map-crs", "EPSG:3067", "--near", 400000, NORTH),
              "from the rough position"),
             ("grid", RUN, grid, ("--tree-map-crs", "EPSG:4326"), "is no place in it"),
+            ("bare", RUN, grid, ("--near", EAST, NORTH), "Give --tree-map-crs EPSG:CODE"),
             ("words", RUN, RUN / "trajectory.tum", (), "expected a map of trees"),
             ("few", few, MAP, (), "found 4")):
         done = by_trees(run, tree_map, folder / f"out_{name}", *more)

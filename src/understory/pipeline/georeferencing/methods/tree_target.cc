@@ -116,6 +116,11 @@ void bring_home(const TreeMapFile& map, const std::filesystem::path& path,
   if (target.near) target.near = Vector2d::Zero();
 }
 
+// The largest coordinate of the box around the trees.
+double farthest_of(const TreeTarget& target) {
+  return std::max(target.low.cwiseAbs().maxCoeff(), target.high.cwiseAbs().maxCoeff());
+}
+
 }  // namespace
 
 TreeTarget read_tree_target(const std::filesystem::path& path, const std::string& system,
@@ -145,6 +150,10 @@ TreeTarget read_tree_target(const std::filesystem::path& path, const std::string
                      fmt::format("expected metres: all trees lie within {:.2g} of each other. Give "
                                  "--tree-map-crs EPSG:4326 if these are degrees",
                                  width));
+  if (!target.origin && farthest_of(target) > config.farthest_m)
+    throw InputError(path.string(), "",
+                     "expected a coordinate system: the file states none, and its coordinates are "
+                     "not those of a local frame. Give --tree-map-crs EPSG:CODE");
   return target;
 }
 

@@ -17,6 +17,7 @@ namespace understory {
 struct TreeTargetConfig {
   double widest_search_m = 1500.0;  // radius that is searched without a rough position
   double narrowest_m = 5.0;         // a map that is narrower is in degrees
+  double farthest_m = 1e6;          // from zero; coordinates of a local frame lie nearer
   double canopy_cell_m = 0.5;       // of the canopy in which tops of a cloud are found
   double tallest_m = 80.0;          // above the ground; higher returns are no trees
 };
