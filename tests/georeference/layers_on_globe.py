@@ -246,6 +246,8 @@ def inventory(folder):
         assert done.returncode in (0, 4), done.stderr
         assert "TM35FIN" in facts_of(folder / name)["coordinate_system"], name
         assert package(folder / name)[0] == {"trees": 3067, "look_again": 3067}
+        title = "run" if name == "run" else "map.laz"
+        assert f"<h1>{title}</h1>" in (folder / name / "report.html").read_text(), title
     expected, found = trees_of(RUN), trees_of(folder / "run")
     apart = np.linalg.norm(found[:, None] - expected[None], axis=2).min(axis=1)
     # The map's points are rounded to millimetres: a doubtful stem of a sparse lidar may come or go.
@@ -264,6 +266,7 @@ def again(folder):
     for name, more, code in (("kept", (), 3067), ("utm", ("--crs", "EPSG:32635"), 32635)):
         done = program("georeference", RUN, "--method", "auto", "--antenna-m", 0, 0, 0.15, "-o", folder / name, *more)
         assert done.returncode == FIRST.returncode, done.stderr
+        assert re.search(r"worth (1 independent fix|([02-9]|\d\d+) independent fixes)\n", done.stdout), done.stdout
         systems, points = package(folder / name)
         assert set(systems.values()) == {code}, systems
         off = np.abs(points - package(RUN)[1]).max()

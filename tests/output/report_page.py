@@ -187,7 +187,7 @@ def check_run(folder):
 def check_inventory(run_folder, folder):
     run(0, "inventory", run_folder, "-o", folder)
     page, facts = read_page(folder)
-    assert page.headings[:2] == ["map.laz", "Complete"], page.headings
+    assert page.headings[:2] == ["run", "Complete"], page.headings
     # The run is too short to tell its place, so its inventory has none either.
     assert page.headings[2:] == RUN_SECTIONS[:1] + RUN_SECTIONS[2:6] + ["Time"] * ("Time" in page.headings)
     check_files(page, folder)

@@ -184,6 +184,10 @@ def check_bad_captures(folder):
     code, out, errors = run("info", "--json", both, "--extrinsics", rig)
     merged = json.loads(out)["lidar"]["points"]
     assert code == 0 and merged == 2 * points, (merged, points, errors)
+    further = json.loads(out)["rig"]["body_from_further_lidars"]
+    assert [lidar["translation_m"] for lidar in further] == [[1, 0, 0]], further
+    code, out, errors = run("info", both, "--extrinsics", rig)
+    assert "body_from_lidar 2: (1.0000, 0.0000, 0.0000) m" in out, out
 
 
 def check_refusals(folder):

@@ -60,6 +60,10 @@ nlohmann::json rig_json(const Rig& rig) {
                          {"imu_source", rig.imu_extrinsic_source},
                          {"gnss_source", rig.gnss_extrinsic_source},
                          {"second_gnss_source", rig.second_gnss_extrinsic_source}};
+  json["body_from_further_lidars"] = nlohmann::json::array();
+  for (const FurtherLidar& lidar : rig.further_lidars)
+    json["body_from_further_lidars"].push_back(
+        pose_json(rig.body_from_lidar * lidar.lidar_from_further));
   json["body_from_imu"] = rig.body_from_imu ? pose_json(*rig.body_from_imu) : nlohmann::json();
   json["body_from_gnss"] = rig.body_from_gnss ? pose_json(*rig.body_from_gnss) : nlohmann::json();
   json["body_from_second_gnss"] =
@@ -212,6 +216,11 @@ void print_text(const RecordingInfo& info) {
                 static_cast<unsigned long long>(info.gnss.headings));
   std::printf("\nextrinsics (body is %s)\n", info.rig.body_frame.c_str());
   print_pose("body_from_lidar", info.rig.body_from_lidar, info.rig.lidar_extrinsic_source);
+  int number = 1;
+  for (const FurtherLidar& lidar : info.rig.further_lidars)
+    print_pose(("body_from_lidar " + std::to_string(++number)).c_str(),
+               info.rig.body_from_lidar * lidar.lidar_from_further,
+               info.rig.lidar_extrinsic_source);
   if (info.imu.samples > 0)
     print_pose("body_from_imu", info.rig.body_from_imu, info.rig.imu_extrinsic_source);
   if (info.gnss.fixes > 0)

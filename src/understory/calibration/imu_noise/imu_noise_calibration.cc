@@ -95,10 +95,11 @@ ImuNoiseResult ImuNoiseCalibration::result(TimeNs origin) const {
         ImuNoiseProblem::kMoves,
         fmt::format("expected an IMU that stands still without a gap for all {:.1f} s; {}",
                     duration, standstill_text(origin)));
-  if (duration < kShortestS)
+  // Samples of a minute span an interval less than it.
+  if (duration + duration / static_cast<double>(samples_ - 1) < kShortestS)
     return refuse(ImuNoiseProblem::kTooShort,
                   fmt::format("expected at least {:.0f} s of standing, and hours for the "
-                              "instability of the bias; found {:.1f} s",
+                              "instability of the bias; found {:.2f} s",
                               kShortestS, duration));
   ImuNoise& noise = result.noise;
   noise.from = first_;

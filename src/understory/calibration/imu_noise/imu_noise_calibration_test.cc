@@ -72,6 +72,9 @@ TEST(ImuNoiseCalibration, FiguresThatDoNotStandOutAreNamed) {
 
 TEST(ImuNoiseCalibration, TooShortRecordingsAndMotionAreProblems) {
   EXPECT_EQ(calibrated(slow_vectornav(1), 30.0).problem, ImuNoiseProblem::kTooShort);
+  // The samples of a whole minute span an interval less.
+  EXPECT_EQ(calibrated(slow_vectornav(1), 60.0).problem, ImuNoiseProblem::kNone);
+  EXPECT_EQ(calibrated(slow_vectornav(1), 59.0).problem, ImuNoiseProblem::kTooShort);
   EXPECT_EQ(ImuNoiseCalibration().result(0).problem, ImuNoiseProblem::kNoSamples);
   ImuNoiseCalibration moving;
   ImuSample sample;

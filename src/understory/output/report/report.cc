@@ -20,7 +20,7 @@ std::string report_html(const ReportInput& input, const std::vector<std::string>
   html += verdict_section(input);
   html += figures_section(input);
   html += map_section(input);
-  html += place_section(input);
+  html += place_section(input, files);
   html += distrust_section(input);
   html += plots_section(input);
   html += stand_section(input);

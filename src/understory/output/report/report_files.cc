@@ -23,7 +23,7 @@ constexpr std::array<ResultFile, 32> kResultFiles = {
      {"plots.csv", "figures of the stand and of its plots", "a spreadsheet"},
      {"plot_classes.csv", "stems of each class of diameters", "a spreadsheet"},
      {"map.qgs", "all layers of this folder on one map", "QGIS: double-click"},
-     {"trees.gpkg", "the same trees as points on a map, the path, and places to walk to",
+     {"trees.gpkg", "the same trees as points on a map, places to walk to, and the path of a run",
       "QGIS: drag the file into the window"},
      {"felled.csv", "trees that were felled meanwhile", "a spreadsheet"},
      {"map.laz", "all points; ground and vegetation have classes of their own",

@@ -291,11 +291,14 @@ void add_place(const ReportInput& input, const Add& add) {
   if (place && place->on_globe) {
     if (!std::isfinite(place->heading_sd_deg)) return;
     constexpr double kAtM = 50.0;
+    constexpr double kLeastM = 0.05;  // what the page would round to nothing
+    const double off_m = kAtM * std::tan(place->heading_sd_deg * M_PI / 180.0);
+    if (off_m < kLeastM) return;
     add(fmt::format("The heading of the map on the globe is known to {:.1f}° (one standard "
                     "deviation).",
                     place->heading_sd_deg),
         fmt::format("{:.0f} m from the middle of the path that is {:.1f} m on the ground.", kAtM,
-                    kAtM * std::tan(place->heading_sd_deg * M_PI / 180.0)));
+                    off_m));
     return;
   }
   if (!input.summary.crs_wkt.empty() || input.north_is_up) return;

@@ -22,8 +22,9 @@ namespace understory {
 // Stumps and lying stems: on the map, and in words and a table. Empty where there are none.
 [[nodiscard]] std::string dead_wood_svg(const InventoryResult& inventory, const MapView& view);
 [[nodiscard]] std::string dead_wood_part(const InventoryResult& inventory, WorldFrame world_frame);
-// Where the run lies on the globe, how that was found and how sure it is.
-[[nodiscard]] std::string place_section(const ReportInput& input);
+// Where the run lies on the globe, how that was found and how sure it is; `files`: names.
+[[nodiscard]] std::string place_section(const ReportInput& input,
+                                        const std::vector<std::string>& files);
 [[nodiscard]] std::string distrust_section(const ReportInput& input);
 [[nodiscard]] std::string stand_section(const ReportInput& input);
 // The sheets of single trees, to look through: a part of the stand's section.

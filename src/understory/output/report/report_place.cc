@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <variant>
 
 #include "understory/georeference/systems/coordinate_system.h"
@@ -87,9 +89,23 @@ void add_errors(const ReportInput& input, const RunPlace& place, Rows& rows) {
   }
 }
 
+// "map.laz, the rasters and trees.gpkg", of those that lie beside the page; `none`: no name is
+// known.
+std::string names_of(const std::vector<std::string>& files,
+                     const std::vector<std::pair<const char*, const char*>>& names,
+                     const char* none) {
+  std::vector<std::string> there;
+  for (const auto& [file, name] : names)
+    if (std::find(files.begin(), files.end(), file) != files.end()) there.emplace_back(name);
+  std::string text;
+  for (std::size_t i = 0; i < there.size(); ++i)
+    text += (i == 0 ? "" : i + 1 == there.size() ? " and " : ", ") + there[i];
+  return text.empty() ? none : text;
+}
+
 }  // namespace
 
-std::string place_section(const ReportInput& input) {
+std::string place_section(const ReportInput& input, const std::vector<std::string>& files) {
   if (!input.summary.place) return "";
   const RunPlace& place = *input.summary.place;
   std::string html = "<section><h2>Where it is</h2>";
@@ -103,10 +119,15 @@ std::string place_section(const ReportInput& input) {
   if (!place.method.empty()) rows.add("found by the method", place.method);
   add_errors(input, place, rows);
   const bool fused = place.enu_from_world.log().norm() == 0.0;
-  return html +
-         "<p>map.laz, the rasters and trees.gpkg are in the coordinate system. trajectory.tum and "
-         "trees.csv are in the frame of the run" +
-         (fused ? fmt::format(": metres {} of the place below",
+  return html + "<p>In the coordinate system: " +
+         names_of(
+             files,
+             {{"map.laz", "map.laz"}, {"dtm.tif", "the rasters"}, {"trees.gpkg", "trees.gpkg"}},
+             "the layers") +
+         ". In the frame of the run: " +
+         names_of(files, {{"trajectory.tum", "trajectory.tum"}, {"trees.csv", "trees.csv"}},
+                  "the tables") +
+         (fused ? fmt::format(", in metres {} of the place below",
                               input.world_frame == WorldFrame::kNed ? "north, east and down"
                                                                     : "east, north and up")
                 : std::string()) +

@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "understory/output/report/report_parts.h"
 #include "understory/output/report/test_count.h"
 
 namespace understory {
@@ -257,6 +258,27 @@ TEST(Report, NumbersOfTheGridStandApart) {
     }
   }
   EXPECT_GT(lines, 20U);
+}
+
+// "known to 0.0 degrees ... that is 0.0 m on the ground" told nothing.
+TEST(Report, AHeadingThatIsExactIsNotDistrusted) {
+  ReportInput input = run_with_loops(1, 0, 0);
+  input.summary.place.emplace();
+  input.summary.place->on_globe = true;
+  input.summary.place->heading_sd_deg = 0.02;
+  EXPECT_EQ(distrust_section(input).find("The heading of the map"), std::string::npos);
+  input.summary.place->heading_sd_deg = 0.2;
+  EXPECT_NE(distrust_section(input).find("0.2 m on the ground"), std::string::npos);
+}
+
+// A run by stems has neither a cloud nor rasters.
+TEST(Report, NamesTheLayersThatAreThere) {
+  ReportInput input;
+  input.summary.place.emplace();
+  input.summary.place->on_globe = true;
+  const std::string all = place_section(input, {"map.laz", "dtm.tif", "trees.gpkg", "trees.csv"});
+  EXPECT_NE(all.find("system: map.laz, the rasters and trees.gpkg."), std::string::npos);
+  EXPECT_EQ(place_section(input, {"trees.gpkg"}).find("map.laz"), std::string::npos);
 }
 
 // Every figure at the top is explained below it.

@@ -28,10 +28,18 @@ constexpr FigureName kFigures[] = {
     {"national_volume_m3_per_ha", "national_volume_sd_m3_per_ha",
      &StandFigures::national_m3_per_ha}};
 
-constexpr const char* kCounts[] = {
-    "trees_in_seen_area", "heights_filled_in", "volumes_filled_in", "heights_lower_bounds",
-    "plots",              "trees_by_crown",    "heights_missing",   "diameters_doubtful",
-    "look_again_places",  "look_again_trees",  "stumps",            "logs"};
+constexpr const char* kCounts[] = {"trees_in_seen_area",
+                                   "heights_filled_in",
+                                   "volumes_filled_in",
+                                   "heights_lower_bounds",
+                                   "plots",
+                                   "trees_by_crown",
+                                   "heights_missing",
+                                   "diameters_doubtful",
+                                   "look_again_places",
+                                   "look_again_trees",
+                                   "stumps",
+                                   "logs"};
 constexpr const char* kOtherQuality[] = {"area_m2", "seen_area_m2", "thin_coverage_share",
                                          "logs_volume_m3"};
 

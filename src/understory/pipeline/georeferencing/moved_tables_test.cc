@@ -30,18 +30,19 @@ TEST(MovedTables, PlacesMoveAndAllElseStays) {
   const fs::path to = both / "result";
   fs::create_directory(from);
   fs::create_directory(to);
-  write_table(from / "stem_curves.csv", "tree_id,height_m,x,y,diameter_m\n7,1.30,2.000,1.000,0.2\n");
+  write_table(from / "stem_curves.csv",
+              "tree_id,height_m,x,y,diameter_m\n7,1.30,2.000,1.000,0.2\n");
   write_table(from / "dead_wood.csv",
-             "id,kind,x,y,z,x_to,y_to,z_to,length_m\n1,log,1.000,0.000,5.000,3,0,6,2.24\n");
+              "id,kind,x,y,z,x_to,y_to,z_to,length_m\n1,log,1.000,0.000,5.000,3,0,6,2.24\n");
   write_table(from / "plots.csv", "plot,kind,x,y,trees\nseen,seen,,,9\n\"A, b\",circle,4,5,3\n");
   write_table(from / "plot_classes.csv", "plot,trees\nseen,9\n");
   Tree tree;
   tree.id = 7;
   tree.z = 2.0;
   // A quarter of a turn to the left, 10 m east, 1 m down.
-  const Pose motion(Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * std::numbers::pi,
-                                                         Eigen::Vector3d::UnitZ())),
-                    Eigen::Vector3d(10.0, 0.0, -1.0));
+  const Pose motion(
+      Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * std::numbers::pi, Eigen::Vector3d::UnitZ())),
+      Eigen::Vector3d(10.0, 0.0, -1.0));
   write_moved_tables(from, to, {tree}, motion);
   EXPECT_EQ(table_at(to / "stem_curves.csv"),
             "tree_id,height_m,x,y,diameter_m\n7,1.30,9.000,2.000,0.2\n");
@@ -60,13 +61,14 @@ TEST(MovedTables, StemCurvesTiltWithTheirTree) {
   const fs::path to = both / "result";
   fs::create_directory(from);
   fs::create_directory(to);
-  write_table(from / "stem_curves.csv", "tree_id,height_m,x,y,diameter_m\n7,3.00,0.000,1.000,0.2\n");
+  write_table(from / "stem_curves.csv",
+              "tree_id,height_m,x,y,diameter_m\n7,3.00,0.000,1.000,0.2\n");
   Tree tree;
   tree.id = 7;
   tree.z = 2.0;
-  const Pose motion(Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * std::numbers::pi,
-                                                         Eigen::Vector3d::UnitX())),
-                    Eigen::Vector3d::Zero());
+  const Pose motion(
+      Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * std::numbers::pi, Eigen::Vector3d::UnitX())),
+      Eigen::Vector3d::Zero());
   write_moved_tables(from, to, {tree}, motion);
   EXPECT_EQ(table_at(to / "stem_curves.csv"),
             "tree_id,height_m,x,y,diameter_m\n7,3.00,0.000,-5.000,0.2\n");

@@ -205,6 +205,12 @@ void write_project(const Stock& stock, const fs::path& results) {
 }
 
 // A run's map and its frames.
+// Of the report: the run, or the file of the cloud.
+std::string title_of(const Stock& stock) {
+  if (!stock.of_run) return stock.path.filename().string();
+  return fs::absolute(stock.path).lexically_normal().parent_path().filename().string();
+}
+
 Stock stock_of(const InventoryRequest& request) {
   Stock stock;
   stock.path = cloud_of(request.cloud);
@@ -375,7 +381,7 @@ void describe(const InventoryRequest& request, const Stock& stock, const Log& lo
   if (!request.config.stand.plots.empty() && !is_plot_text(request.config.stand.plots))
     documents.add_input(request.config.stand.plots, progress);
   ReportInput& report = documents.report();
-  report.title = stock.path.filename().string();
+  report.title = title_of(stock);
   report.made_from =
       fmt::format("Inventory of a point cloud: {}, {} points", cloud.format, inventory.points);
   report.picture = &stock.picture;

@@ -181,8 +181,9 @@ Placement placement_of(const GeoreferenceRequest& request, const MovableRun& run
   placement.gnss = rows_of(fit.fixes, "far off the others, or of another time");
   placement.summary = fmt::format(
       "{}: {} fixes at times of the path, {:.2f} m off it in the plane (root mean square), worth "
-      "{:.0f} independent ones\nexpected error {:.2f} m over the path; one standard deviation: {}",
-      method, fit.fixes_in_time, fit.plane_rms_m, fit.independent_fixes, fit.expected_error_m,
+      "{:.0f} independent {}\nexpected error {:.2f} m over the path; one standard deviation: {}",
+      method, fit.fixes_in_time, fit.plane_rms_m, fit.independent_fixes,
+      std::lround(fit.independent_fixes) == 1 ? "fix" : "fixes", fit.expected_error_m,
       precision_of(placement));
   if (request.gnss.empty())
     placement.inputs.push_back(hash_input(input.file));
