@@ -424,8 +424,8 @@ std::string section_of_moved(const ReportInput& input) {
   const ReportTimeAndAxes told{input.scans.empty() ? 0 : input.scans.front().stamp,
                                input.world_frame};
   return "<section><h2>Trees</h2><p>These are the trees of the run that was moved. Its own report "
-         "shows their cross sections. ± is one standard deviation of the diameter. A height is "
-         "given only where the top was seen.</p><div class=\"two\">" +
+         "shows their cross sections. ± is one standard deviation of the diameter. ≥ marks a "
+         "height that is a lower bound.</p><div class=\"two\">" +
          diameters(trees) + "</div>" + fall_table(input.falls, told) +
          tree_table(trees, nullptr, true, told) + "</section>\n";
 }

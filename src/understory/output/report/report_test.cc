@@ -281,6 +281,28 @@ TEST(Report, NamesTheLayersThatAreThere) {
   EXPECT_EQ(place_section(input, {"trees.gpkg"}).find("map.laz"), std::string::npos);
 }
 
+// The height curve and the form factor are not known again, and what they filled in is.
+TEST(Report, AMovedRunTellsWhatWasFilledIn) {
+  const std::vector<Tree> trees = {tree_at_origin(1, 0.2, 0.01, 12.0)};
+  StandTable stand;
+  stand.seen.trees = 91;
+  stand.seen.seen_m2 = 1190.0;
+  stand.seen.stems_per_ha = {764.0, 8.0};
+  stand.seen.heights_filled_in = 19;
+  stand.seen.volumes_filled_in = 19;
+  ReportInput input;
+  input.moved = input.trees_of_cloud = true;
+  input.trees = &trees;
+  input.area_m2 = 7548.0;
+  input.stand = &stand;
+  const std::string html = report_html(input);
+  EXPECT_NE(html.find("764 ± 8"), std::string::npos);
+  EXPECT_EQ(html.find("stems per hectare seen"), std::string::npos);
+  EXPECT_NE(html.find("19 of 91 heights were not seen. A height curve stands for them."),
+            std::string::npos);
+  EXPECT_EQ(html.find(" nan"), std::string::npos);
+}
+
 // Every figure at the top is explained below it.
 TEST(Report, EachFigureHasItsMeaning) {
   const std::string html = report_html(run_with_loops(1, 0, 0));
