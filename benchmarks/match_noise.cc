@@ -60,8 +60,8 @@ class Matching {
     const MatchTargetPtr local_map = map_.local_map();
     const DenseEstimate estimate = odometry_.process(scan, local_map);
     if (estimate.matched) print_match(file_, scan.stamp, estimate.match, local_map->reach_m());
-    if (estimate.update.new_world_from_old_world)
-      map_.move_world(*estimate.update.new_world_from_old_world);
+    if (const auto& levelled = estimate.update.new_world_from_old_world)
+      static_cast<void>(map_.level(*levelled, estimate.state.world_from_body));  // one piece
     const KeyframeOffer offer = {estimate.state.world_from_body, estimate.state.pose_covariance,
                                  estimate.found_share, estimate.match.fitness_m2};
     if ((local_map != nullptr && !estimate.matched) || !map_.wants(offer)) return;
