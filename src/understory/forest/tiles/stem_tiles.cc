@@ -91,12 +91,13 @@ class StemTiles {
     for (const StemCut cut : {StemCut::kThin, StemCut::kThick, StemCut::kFoliage})
       search_cut(cut, harvest.stems);
     for (const HeightRange& heights : hidden_stem_heights(config_)) {
-      search(harvest.stems, shadow_reach_m(), [&](Nearby nearby, const StemSearchArea& where) {
-        const std::vector<SlicePoint> above = points_in(above_, cloud_, origin_, nearby.around);
-        std::vector<SlicePoint> points =
-            points_over_shadows(nearby.slices, above, heights.lowest_m, heights.highest_m);
-        return detect_hidden_stems(heights, points, nearby.stems, config_, where, progress_);
-      });
+      search(
+          harvest.stems, shadow_reach_m(), [&](const Nearby& nearby, const StemSearchArea& where) {
+            const std::vector<SlicePoint> above = points_in(above_, cloud_, origin_, nearby.around);
+            std::vector<SlicePoint> points =
+                points_over_shadows(nearby.slices, above, heights.lowest_m, heights.highest_m);
+            return detect_hidden_stems(heights, points, nearby.stems, config_, where, progress_);
+          });
     }
     if (config_.thin_dbh_m > 0.0) search_cut(StemCut::kThinnest, harvest.stems);
     add_shown(harvest.slices);
