@@ -10,8 +10,8 @@
 //   chosen   by judgement, fitted to nothing
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
-//   probed   a fifth less or a quarter more finds or loses two of 636 stems at most
-//            (./run bench constants)
+//   probed   a fifth less or a quarter more finds or loses two of 636 stems at most, as
+//            ./run bench constants shows.
 //   not recorded   in use for long, and nothing tells why it is this number
 // or real clouds and measurements by their page.
 namespace understory::stem_constants {

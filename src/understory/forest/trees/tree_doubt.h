@@ -23,10 +23,10 @@ struct StandDoubts {
 [[nodiscard]] StandDoubts doubts_of(const std::vector<Tree>& trees);
 
 // How far the diameter of a tree is to be trusted, in one word for a table, the worst that applies:
-// - "no_diameter": it was found by its crown alone,
-// - "weak_diameter": see has_weak_diameter,
-// - "breast_height_hidden": nothing was seen of its stem below 1.5 m above the ground,
-// - "one_side": less than half of its circumference was seen,
+// - "no_diameter": it was found by its crown alone.
+// - "weak_diameter": see has_weak_diameter.
+// - "breast_height_hidden": nothing was seen of its stem below 1.5 m above the ground.
+// - "one_side": less than half of its circumference was seen.
 // - "good": none of these.
 // A cut has "two_rings" as well (slice/slice_stems.h), a cloud "twice" (trees/double_images.h), and
 // "coarse" where its places are rounded (pipeline/inventory/cloud_inventory.cc).
