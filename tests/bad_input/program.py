@@ -3,6 +3,7 @@ docs/reference/troubleshooting.md: 0 mended or harmless, 3 nothing usable, 4 not
 
 import concurrent.futures
 import fcntl
+import functools
 import hashlib
 import json
 import os
@@ -10,6 +11,7 @@ import pathlib
 import shutil
 import subprocess
 import tempfile
+import time
 
 from recordings import Message, read_mcap, write_mcap
 
@@ -57,20 +59,43 @@ def snapshot(folder):
             for path in sorted(folder.rglob("*"))}
 
 
-def made_once(words, make):
-    """A folder that `make(folder)` fills once for all tests of this build. Its name tells `words`, the program and this
-    file, so that another program makes it anew. Tests read what lies there, and write elsewhere."""
-    shared = pathlib.Path(os.environ.get("UNDERSTORY_BUILD", pathlib.Path(PROGRAM).parent)) / "tests" / "recordings"
-    shared.mkdir(parents=True, exist_ok=True)
+SOURCE = pathlib.Path(__file__).resolve().parent.parent.parent
+BUILD = pathlib.Path(os.environ.get("UNDERSTORY_BUILD", pathlib.Path(PROGRAM).parent))
+CACHE = pathlib.Path(os.environ.get("UNDERSTORY_CACHE", pathlib.Path.home() / ".cache" / "understory"))
+KEPT_DAYS = 3  # recordings that no test asked for so long are removed
+
+
+def digest(files, *texts):
     made_by = hashlib.sha256()
-    for file in (PROGRAM, __file__):
+    for file in files:
         made_by.update(pathlib.Path(file).read_bytes())
-    made_by = made_by.hexdigest()[:12]
-    name = f"{made_by}-{hashlib.sha256(repr(words).encode()).hexdigest()[:16]}"
+    for text in texts:
+        made_by.update(text.encode())
+    return made_by.hexdigest()[:12]
+
+
+@functools.cache
+def simulator():
+    """What decides the bytes of a simulated recording: the sources of the simulator, and how they were compiled."""
+    layers = [SOURCE / "src" / "understory" / layer for layer in ("util", "geometry", "sensor", "recording", "simulation")]
+    files = [file for layer in layers for pattern in ("*.cc", "*.h", "*.in", "*.txt") for file in layer.rglob(pattern)
+             if not file.name.endswith("_test.cc")]
+    files += [SOURCE / "src" / "understory" / "cli" / "simulate.cc", SOURCE / "CMakePresets.json",
+              *(SOURCE / "cmake").glob("*.cmake"), *(SOURCE / "configs" / "sites").glob("*.yaml")]
+    flags = [line for line in (BUILD / "CMakeCache.txt").read_text().splitlines()
+             if line.startswith(("CMAKE_BUILD_TYPE", "CMAKE_CXX", "UNDERSTORY_MARCH", "UNDERSTORY_SANITIZERS", "UNDERSTORY_UNITY"))]
+    return digest(sorted(files), *flags)
+
+
+def made_once(words, make, made_by=None, shared=BUILD / "tests" / "recordings"):
+    """A folder that `make(folder)` fills once for all tests. Its name tells `words` and who made it, by default this
+    program. What nobody asked for in some days goes. Tests read what lies there, and write elsewhere."""
+    shared.mkdir(parents=True, exist_ok=True)
+    name = f"{made_by or digest((PROGRAM, __file__))}-{hashlib.sha256(repr(words).encode()).hexdigest()[:16]}"
     with open(shared / "lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         for path in shared.glob("*-*"):
-            if not path.name.startswith(made_by):
+            if path.stat().st_mtime < time.time() - KEPT_DAYS * 86_400:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
         own = open(shared / f"{name}.lock", "w")
     with own:
@@ -79,16 +104,19 @@ def made_once(words, make):
             half = pathlib.Path(tempfile.mkdtemp(prefix=f"{name}.", dir=shared))
             make(half)
             half.rename(shared / name)
+        os.utime(shared / name)
     return shared / name
 
 
 def simulated(site, seed, seconds, *settings):
-    """A recording that `simulate` wrote with those settings, its truth beside it in walk.truth; shared by all tests."""
+    """A recording that `simulate` wrote with those settings, its truth beside it in walk.truth. It lies in the cache, for
+    all tests of all builds whose simulator is the same."""
     def make(folder):
         done = program("simulate", site, "-o", folder / "walk.mcap", "--seed", seed, "--duration-s", seconds,
                        *(word for setting in settings for word in ("--set", setting)))
         assert done.returncode == 0, done.stderr
-    return made_once(("simulate", site, seed, seconds, *settings), make) / "walk.mcap"
+    words = ("simulate", site, seed, seconds, *settings)
+    return made_once(words, make, simulator(), CACHE / "recordings") / "walk.mcap"
 
 
 def unpacked(recording):
