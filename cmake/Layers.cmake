@@ -2,8 +2,8 @@ if(UNDERSTORY_TESTS)
   add_custom_target(layer_tests COMMENT "the test programs of the layers")
 endif()
 
-# understory_layer(<name> [TOGETHER <number>] SOURCES ... [APART ...] [TESTS ...] [DEPENDS ...] [LIBRARIES ...]
-#                  [PRIVATE_LIBRARIES ...] [TEST_LIBRARIES ...])
+# understory_layer(<name> [TOGETHER <number>] SOURCES ... [APART ...] [COLD ...] [TESTS ...] [DEPENDS ...]
+#                  [LIBRARIES ...] [PRIVATE_LIBRARIES ...] [TEST_LIBRARIES ...])
 # One folder under src/understory is one static library understory_<name> (alias understory::<name>).
 #   SOURCES            explicit .cc files; without any the layer is headers only
 #   TOGETHER           how many files are compiled as one with UNDERSTORY_UNITY: 8. More save what their
@@ -13,13 +13,15 @@ endif()
 #   OPTIMISED          the compiler's option where it is not the usual one. -O1 suits layers in which no time is spent
 #   APART              further ones that are compiled by themselves, also with UNDERSTORY_UNITY: names in
 #                      them clash with others', or their loops are to be optimised for themselves
+#   COLD               further ones in which no time is spent: united apart from the others, and optimised by -O1, which
+#                      the compiler does in two thirds of the time
 #   TESTS              x_test.cc beside x.cc; together the GoogleTest program test_<name>
 #   DEPENDS            layers before it in the order of the top CMakeLists.txt (PUBLIC)
 #   LIBRARIES          third-party targets that its headers need (PUBLIC)
 #   PRIVATE_LIBRARIES  third-party targets that only its .cc files need
 function(understory_layer name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "TOGETHER;OPTIMISED"
-                        "SOURCES;APART;TESTS;DEPENDS;LIBRARIES;PRIVATE_LIBRARIES;TEST_LIBRARIES")
+                        "SOURCES;APART;COLD;TESTS;DEPENDS;LIBRARIES;PRIVATE_LIBRARIES;TEST_LIBRARIES")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "understory_layer(${name}): unknown argument ${arg_UNPARSED_ARGUMENTS}")
   endif()
@@ -38,6 +40,10 @@ function(understory_layer name)
     if(NOT arg_OPTIMISED)
       set_property(GLOBAL APPEND PROPERTY understory_fast_layers ${target})
     endif()
+    if(arg_COLD)
+      understory_cold_files(${target} FILES ${arg_COLD}
+                            LIBRARIES ${arg_DEPENDS} ${arg_LIBRARIES} ${arg_PRIVATE_LIBRARIES})
+    endif()
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
@@ -51,6 +57,17 @@ function(understory_layer name)
                     LIBRARIES ${arg_TEST_LIBRARIES} ${arg_PRIVATE_LIBRARIES} LABELS layer)
     add_dependencies(layer_tests test_${name})
   endif()
+endfunction()
+
+# understory_cold_files(<layer> FILES ... LIBRARIES ...): compiles them for the layer's library, with less optimisation.
+function(understory_cold_files layer)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "FILES;LIBRARIES")
+  add_library(${layer}_cold OBJECT)
+  understory_unite(${layer}_cold 16 ${arg_FILES})
+  target_link_libraries(${layer}_cold PRIVATE understory_own_code understory_flags ${arg_LIBRARIES})
+  target_include_directories(${layer}_cold PRIVATE "${PROJECT_SOURCE_DIR}/src")
+  understory_precompile(${layer}_cold -O1)
+  target_sources(${layer} PRIVATE "$<TARGET_OBJECTS:${layer}_cold>")
 endfunction()
 
 # understory_unite(<target> <together> <source>...): makes the files parts of the target. With
