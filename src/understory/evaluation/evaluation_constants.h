@@ -81,6 +81,9 @@ inline constexpr double kPathStepM = 0.5;
 namespace tree_errors {  // evaluation/trees/tree_errors.cc
 // m: no tree is thicker at breast height [bound: the thickest known one, a cypress of 11.6 m]
 inline constexpr double kThickestTreeM = 12.0;
+// m: no z of a tree is lower, with z up or down; -9999 stands for an unknown one [bound: the
+// highest mountain]
+inline constexpr double kLowestGroundM = -9000.0;
 }  // namespace tree_errors
 
 namespace tree_list_check {  // evaluation/trees/tree_list_check.cc

@@ -17,7 +17,7 @@
 namespace understory {
 namespace {
 
-using evaluation_constants::tree_errors::kThickestTreeM;
+using namespace evaluation_constants::tree_errors;
 
 // Nothing where the cell is empty or not finite.
 std::optional<int> whole_number(const CsvReader& table, const std::string& column) {
@@ -45,13 +45,23 @@ struct ThickRow {
   double dbh_m = 0.0;
 };
 
-// Refuses what stands for an unknown diameter elsewhere: 0, -1, -9999.
-void refuse_no_diameter(const CsvReader& table, const Tree& tree) {
-  if (tree.dbh_m <= 0.0)
-    table.fail(fmt::format(
-        "expected a diameter above 0 in column 'dbh_m', found {:.6g}: an unknown one is an empty "
-        "cell",
-        tree.dbh_m));
+// Refuses what stands for an unknown size elsewhere: 0, -1, -9999.
+void refuse_no_size(const CsvReader& table, const char* what, const char* column, double size_m) {
+  if (size_m <= 0.0)
+    table.fail(
+        fmt::format("expected a {} above 0 in column '{}', found {:.6g}: an unknown one is an "
+                    "empty cell",
+                    what, column, size_m));
+}
+
+void refuse_unknown(const CsvReader& table, const Tree& tree) {
+  refuse_no_size(table, "diameter", "dbh_m", tree.dbh_m);
+  refuse_no_size(table, "height", "height_m", tree.height_m);
+  if (tree.z < kLowestGroundM)
+    table.fail(
+        fmt::format("expected a place in metres in column 'z', found {:.6g}: no tree stands "
+                    "so low, and an unknown one is an empty cell",
+                    tree.z));
 }
 
 double ratio(std::size_t part, std::size_t whole) {
@@ -95,7 +105,7 @@ std::vector<Tree> read_trees(const std::filesystem::path& path) {
     Tree tree;
     for (const TreeColumn& column : kTreeColumns)
       read_cell(table, column, tree);
-    refuse_no_diameter(table, tree);
+    refuse_unknown(table, tree);
     if (tree.dbh_m > kThickestTreeM && !thick)
       thick = ThickRow{table.lines().position(), tree.dbh_m};
     if (!std::isfinite(table.number("id"))) tree.id = static_cast<int>(trees.size()) + 1;

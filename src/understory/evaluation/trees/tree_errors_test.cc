@@ -187,15 +187,16 @@ TEST(TreeErrors, ReadsTheColumnsByName) {
   std::filesystem::remove(path);
 }
 
-// What reading a list says, that has six trees in `unit` and one with `dbh` in line 8.
-std::string complaint_of_diameter(const std::string& dbh, double unit = 1.0) {
+// What reading a list says, that has six trees with `usual` in a column and one with `last` in
+// line 8.
+std::string complaint_of(const char* column, double usual, const std::string& last) {
   const test::TemporaryFolder folder;
   const std::string path = folder / "trees.csv";
   std::ofstream list(path);
-  list << "x,y,dbh_m\n";
+  list << "x,y," << column << "\n";
   for (int k = 0; k < 6; ++k)
-    list << 3 * k << ",0," << 0.3 * unit << "\n";
-  list << "1,5," << dbh << "\n";
+    list << 3 * k << ",0," << usual << "\n";
+  list << "1,5," << last << "\n";
   list.close();
   try {
     (void)read_trees(path);
@@ -203,6 +204,10 @@ std::string complaint_of_diameter(const std::string& dbh, double unit = 1.0) {
     return error.what();
   }
   return {};
+}
+
+std::string complaint_of_diameter(const std::string& dbh, double unit = 1.0) {
+  return complaint_of("dbh_m", 0.3 * unit, dbh);
 }
 
 // Bug: a dbh of -9999 counted as a diameter, and a list of negative ones ended the program.
@@ -218,6 +223,18 @@ TEST(TreeErrors, ADiameterThatIsNoneIsRefused) {
     EXPECT_EQ(complaint_of_diameter(dbh), "") << dbh;
   // A list in centimetres is read: who compares it says which unit it is in.
   EXPECT_EQ(complaint_of_diameter("25", 100.0), "");
+}
+
+// Bug: heights of -9999 were taken as numbers.
+TEST(TreeErrors, AHeightThatIsNoneIsRefused) {
+  for (const char* height : {"0", "-1", "-9999"}) {
+    const std::string complaint = complaint_of("height_m", 20.0, height);
+    EXPECT_NE(complaint.find("line 8"), std::string::npos) << complaint;
+    EXPECT_NE(complaint.find("'height_m'"), std::string::npos) << complaint;
+  }
+  EXPECT_EQ(complaint_of("height_m", 20.0, ""), "");
+  EXPECT_NE(complaint_of("z", 150.0, "-9999").find("line 8"), std::string::npos);
+  EXPECT_EQ(complaint_of("z", 150.0, "-430"), "");
 }
 
 }  // namespace
