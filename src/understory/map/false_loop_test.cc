@@ -96,14 +96,9 @@ KeyframeMap::Config paper_config() {
   return config;
 }
 
-// `slip`: from half way on the walker truly is that far from its estimated pose.
-SlippedWalk slipped_walk(const Stand& stand, const Eigen::Vector3d& slip,
-                         const KeyframeMap::Config& config = own_config()) {
-  const test::TemporaryFolder folder;
-  StageTimes times;
-  Log log;
-  KeyframeMap map(config, folder.path(), times, log);
-  map.start();
+// `slip`: from half way on the walker truly is that far from its estimated pose. Gives what the
+// loops moved the present by.
+Pose walk(KeyframeMap& map, const Stand& stand, const Eigen::Vector3d& slip) {
   Pose moved;
   for (int step = 0; step <= kSteps; ++step) {
     const Pose truth =
@@ -114,6 +109,17 @@ SlippedWalk slipped_walk(const Stand& stand, const Eigen::Vector3d& slip,
                 {scan_at(stand, truth, static_cast<std::uint64_t>(step)), {}});
     if (now) moved = *now * moved;
   }
+  return moved;
+}
+
+SlippedWalk slipped_walk(const Stand& stand, const Eigen::Vector3d& slip,
+                         const KeyframeMap::Config& config = own_config()) {
+  const test::TemporaryFolder folder;
+  StageTimes times;
+  Log log;
+  KeyframeMap map(config, folder.path(), times, log);
+  map.start();
+  static_cast<void>(walk(map, stand, slip));
   map.finish();
   SlippedWalk result;
   for (std::size_t i = 0; i < map.loops().size(); ++i) {
@@ -142,6 +148,33 @@ TEST(FalseLoops, ATrueReturnIsClosed) {
   const Pose truth = Pose(Eigen::Quaterniond::Identity(), slip) * estimated(kSteps);
   const Pose first = result.keyframes.front().world_from_body;
   const Pose found = estimated(0) * first.inverse() * result.keyframes.back().world_from_body;
+  EXPECT_LT((found.translation() - truth.translation()).norm(), 0.25);
+}
+
+// Bug: levelling dropped the poses that a running search found, and kept its loops.
+TEST(FalseLoops, LevellingAppliesWhatARunningSearchFinds) {
+  const Eigen::Vector3d slip(0.8, -0.6, 0.0);
+  KeyframeMap::Config config = own_config();
+  config.loop_closure.handover_keyframes = 1000;
+  config.loop_closure.search.interval_s = kSteps - 2;  // one search, of the place of the return
+  const test::TemporaryFolder folder;
+  StageTimes times;
+  Log log;
+  KeyframeMap map(config, folder.path(), times, log);
+  map.start();
+  const Pose moved = walk(map, grown_stand(), slip);
+  ASSERT_EQ(moved.log().norm(), 0.0);
+  ASSERT_TRUE(map.loops().empty());
+
+  const Pose turn(so3_exp({0.0, 0.05, 0.0}), Eigen::Vector3d::Zero());
+  const Pose turned = turn * estimated(kSteps);
+  const std::optional<Pose> back = map.level(turn, turned);
+  ASSERT_TRUE(back);
+  const Pose present = map.keyframes().back().world_from_body;
+  EXPECT_LT(right_difference(*back * turned, present).norm(), 1e-9);
+  const Pose found = map.keyframes().front().world_from_body.inverse() * present;
+  const Pose truth =
+      estimated(0).inverse() * Pose(Eigen::Quaterniond::Identity(), slip) * estimated(kSteps);
   EXPECT_LT((found.translation() - truth.translation()).norm(), 0.25);
 }
 

@@ -390,23 +390,32 @@ void KeyframeMap::set_poses(const std::vector<Pose>& world_from_keyframe) {
 }
 
 std::optional<Pose> KeyframeMap::level(const Pose& turn, const Pose& world_from_body) {
-  // What a running search finds refers to the world as it was. Its loops are kept for the next
-  // optimisation, its poses are not.
-  static_cast<void>(loops_.take(keyframes_.size(), true, true));
+  // What a running search finds refers to the world before the turn, so it is applied first.
+  std::optional<Pose> found;
+  if (auto outcome = loops_.take(keyframes_.size(), true, true))
+    found = take_over(std::move(*outcome));
   std::optional<Pose> back;
+  if (found) back = turn * *found * turn.inverse();
   const std::size_t first = segment_start();
   if (first > 0) {
+    const Pose body = back.value_or(Pose()) * world_from_body;
     const Eigen::Vector3d pivot = first < keyframes_.size()
                                       ? keyframes_[first].world_from_body.translation()
-                                      : turn.inverse() * world_from_body.translation();
-    back = Pose(Eigen::Quaterniond::Identity(), pivot - turn * pivot);
+                                      : turn.inverse() * body.translation();
+    const Pose held(Eigen::Quaterniond::Identity(), pivot - turn * pivot);
+    back = held * back.value_or(Pose());
+    level_from(first, held * turn);
+  } else {
+    level_from(0, turn);
   }
-  moved_ = true;
-  const Pose moved = back ? *back * turn : turn;
-  for (std::size_t i = first; i < keyframes_.size(); ++i)
-    keyframes_[i].world_from_body = moved * keyframes_[i].world_from_body;
-  if (snapshot_ != nullptr) rebuild_local_map();
   return back;
+}
+
+void KeyframeMap::level_from(std::size_t first, const Pose& new_world_from_old_world) {
+  moved_ = true;
+  for (std::size_t i = first; i < keyframes_.size(); ++i)
+    keyframes_[i].world_from_body = new_world_from_old_world * keyframes_[i].world_from_body;
+  if (snapshot_ != nullptr) rebuild_local_map();
 }
 
 void KeyframeMap::sync() {

@@ -126,6 +126,7 @@ class KeyframeMap {
   // the body. The pieces before stay where they are, as they were levelled themselves.
   // `world_from_body`: of the body, turned already. Gives what moves the present after that turn,
   // if anything does.
+  // A running search is waited for, and what it found moves the present, too.
   [[nodiscard]] std::optional<Pose> level(const Pose& turn, const Pose& world_from_body);
 
   // Null while it is empty.
@@ -164,6 +165,7 @@ class KeyframeMap {
   void take_local_map(LoopOutcome& outcome);
   void tell_of_radius();
   void take_snapshot();
+  void level_from(std::size_t first, const Pose& new_world_from_old_world);
   void rebuild_local_map();
   [[nodiscard]] Matrix6d edge_covariance(const Pose& previous_from_this) const;
   [[nodiscard]] std::optional<Pose> close_in_present();
