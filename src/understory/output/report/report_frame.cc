@@ -138,15 +138,12 @@ void add_stand(Tiles& tiles, const std::vector<Tree>& all_trees, double area_m2)
                 "stand has more. For a plot, count the trees of trees.csv within its border.");
     }
   }
-  if (n > 0) {
+  if (n > 0 && hectares > 0.0) {
     tiles.add(fmt::format("{:.1f} cm", 100.0 * dbh / n), "mean diameter at 1.3 m",
               "Mean of the measured diameters, 1.3 m above the ground.");
-    if (hectares > 0.0) {
-      tiles.add(
-          fmt::format("≈ {:.1f} m²/ha", basal / hectares), "basal area",
-          "Cross sections of all measured stems at 1.3 m, per hectare of that area. Too small "
-          "where stems are missed.");
-    }
+    tiles.add(fmt::format("≈ {:.1f} m²/ha", basal / hectares), "basal area",
+              "Cross sections of all measured stems at 1.3 m, per hectare of that area. Too small "
+              "where stems are missed.");
   }
   if (with_volume > 0 && hectares > 0.0) {
     tiles.add(fmt::format("≈ {:.0f} m³/ha", volume / hectares), "stem volume over bark",
@@ -157,22 +154,25 @@ void add_stand(Tiles& tiles, const std::vector<Tree>& all_trees, double area_m2)
   }
 }
 
-// What stands for a hectare: of the area in which stems could be seen.
+// What stands for a hectare, and the mean diameter: of the area in which stems could be seen.
 void add_figures(Tiles& tiles, const StandFigures& seen) {
   if (!(seen.seen_m2 > 0.0)) return;
   tiles.add(fmt::format("{:.2f} ha", seen.seen_m2 / 1e4), "area seen (not a plot's border)",
             "Where returns reached the ground or the stems densely enough to find stems. What lies "
             "behind stems or farther away does not count, nor do trees there. For a plot of your "
             "own give --plots.");
-  const auto add = [&](const Measured& figure, int decimals, const char* label,
-                       const char* meaning) {
+  const auto add = [&](const Measured& figure, int decimals, const char* label, const char* meaning,
+                       double scale = 1.0) {
     if (std::isfinite(figure.value))
-      tiles.add(fmt::format("{:.{}f} ± {:.{}f}", figure.value, decimals, figure.sd, decimals),
+      tiles.add(fmt::format("{:.{}f} ± {:.{}f}", scale * figure.value, decimals, scale * figure.sd,
+                            decimals),
                 label, meaning);
   };
   add(seen.stems_per_ha, 0, "stems per hectare",
       "Trees in the area seen over that area. ± is one standard deviation of the errors of "
       "measurement.");
+  add(seen.mean_dbh_m, 1, "mean diameter at 1.3 m, cm",
+      "Mean of the diameters of these trees, 1.3 m above the ground.", 100.0);
   add(seen.basal_area_m2_per_ha, 1, "basal area, m² per hectare",
       "Cross sections of these stems at 1.3 m, per hectare of the area seen.");
   add(seen.volume_m3_per_ha, 0, "stem volume over bark, m³ per hectare",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
 #include <utility>
 #include <variant>
 
@@ -36,6 +37,39 @@ constexpr std::array<Residual, 12> kResiduals = {{
     {"terrain_median_m", "ground above the terrain model, median", "m", 1.0, 2},
     {"terrain_tilt_deg", "tilt that the terrain model took out", "°", 1.0, 2},
 }};
+
+// What placed the map, in words of the forest.
+struct MethodWords {
+  std::string_view name;  // as `georeference --method` names it
+  const char* words;
+};
+constexpr std::array<MethodWords, 9> kMethodWords = {{
+    {"split", "satellite positions: heading and place in the plane, height and tilt apart"},
+    {"fit3", "satellite positions, each as exact as it states"},
+    {"fit6", "satellite positions, smoothed with the IMU"},
+    {"closed", "satellite positions, all with equal weight"},
+    {"gnss-path", "the shape of the receiver's path"},
+    {"fuse", "satellite positions, which also correct the path"},
+    {"points", "surveyed points"},
+    {"terrain", "a terrain model: height and tilt"},
+    {"trees", "the trees of a map or of a cloud from the air"},
+}};
+
+// Several methods are joined by "+".
+std::string words_of_method(std::string_view names) {
+  std::string text;
+  while (!names.empty()) {
+    const std::string_view name = names.substr(0, names.find('+'));
+    names.remove_prefix(std::min(names.size(), name.size() + 1));
+    const auto* known =
+        std::find_if(kMethodWords.begin(), kMethodWords.end(),
+                     [&](const MethodWords& method) { return method.name == name; });
+    text += text.empty() ? "" : "; ";
+    text += known == kMethodWords.end() ? fmt::format("method {}", name)
+                                        : fmt::format("{} (method {})", known->words, name);
+  }
+  return text;
+}
 
 class Rows {
  public:
@@ -116,7 +150,7 @@ std::string place_section(const ReportInput& input, const std::vector<std::strin
   Rows rows;
   add_coordinates(input, place, rows);
   add_origin(place, rows);
-  if (!place.method.empty()) rows.add("found by the method", place.method);
+  if (!place.method.empty()) rows.add("found by", words_of_method(place.method));
   add_errors(input, place, rows);
   const bool fused = place.enu_from_world.log().norm() == 0.0;
   return html + "<p>In the coordinate system: " +

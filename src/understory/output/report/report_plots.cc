@@ -81,12 +81,15 @@ std::string filled_in(const StandTable& stand) {
   std::string html;
   if (seen.heights_filled_in > 0 && stand.curve)
     html += fmt::format(
-        " {} of {} heights were not seen. A height curve of {} trees of the list stands for them "
-        "(single trees are ± {:.1f} m about it).",
+        " The tops of {} of these {} trees were not seen, or not surely. A height curve of {} "
+        "trees "
+        "of the list stands for their heights (single trees are ± {:.1f} m about it).",
         seen.heights_filled_in, seen.trees, stand.curve->trees, stand.curve->sd_m);
   if (seen.heights_filled_in > 0 && !stand.curve)  // of a run that was moved
-    html += fmt::format(" {} of {} heights were not seen. A height curve stands for them.",
-                        seen.heights_filled_in, seen.trees);
+    html += fmt::format(
+        " The tops of {} of these {} trees were not seen, or not surely. A height curve stands for "
+        "their heights.",
+        seen.heights_filled_in, seen.trees);
   if (seen.heights_lower_bounds > 0)
     html += fmt::format(
         " Heights and volumes are <b>lower bounds</b>: the tops of {} of {} trees were not seen, "

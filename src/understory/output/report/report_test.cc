@@ -281,6 +281,17 @@ TEST(Report, NamesTheLayersThatAreThere) {
   EXPECT_EQ(place_section(input, {"trees.gpkg"}).find("map.laz"), std::string::npos);
 }
 
+// "found by the method: split" was not understood.
+TEST(Report, SaysInWordsWhatPlacedTheMap) {
+  ReportInput input;
+  input.summary.place.emplace();
+  input.summary.place->on_globe = true;
+  input.summary.place->method = "fit3+trees";
+  const std::string html = place_section(input, {});
+  EXPECT_NE(html.find("each as exact as it states (method fit3); the trees of"), std::string::npos);
+  EXPECT_NE(html.find("(method trees)"), std::string::npos);
+}
+
 // The height curve and the form factor are not known again, and what they filled in is.
 TEST(Report, AMovedRunTellsWhatWasFilledIn) {
   const std::vector<Tree> trees = {tree_at_origin(1, 0.2, 0.01, 12.0)};
@@ -298,7 +309,7 @@ TEST(Report, AMovedRunTellsWhatWasFilledIn) {
   const std::string html = report_html(input);
   EXPECT_NE(html.find("764 ± 8"), std::string::npos);
   EXPECT_EQ(html.find("stems per hectare seen"), std::string::npos);
-  EXPECT_NE(html.find("19 of 91 heights were not seen. A height curve stands for them."),
+  EXPECT_NE(html.find("The tops of 19 of these 91 trees were not seen, or not surely."),
             std::string::npos);
   EXPECT_EQ(html.find(" nan"), std::string::npos);
 }
