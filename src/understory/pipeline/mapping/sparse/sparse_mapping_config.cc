@@ -8,13 +8,6 @@
 namespace understory {
 namespace {
 
-std::string joined(const std::vector<std::string>& keys) {
-  std::string text;
-  for (const std::string& key : keys)
-    text += (text.empty() ? "" : ", ") + key;
-  return text;
-}
-
 void read_boxes(SparseMappingConfig& config) {
   if (config.machine_boxes_file.empty()) return;
   config.front_end.machine_boxes = std::make_shared<const std::vector<MachineBox>>(
@@ -56,12 +49,13 @@ ReadConfig<SparseMappingConfig> read_sparse_mapping_config(const std::string& pr
   ConfigOrigins origins;
   problems.gather([&] {
     if (profile.empty()) return;
-    std::vector<std::string> passed_over;
-    table.read_yaml(profile_text(profile), "profile " + profile, &passed_over);
+    // A profile serves both front ends: what it sets for scans alone is no news.
+    std::vector<std::string> for_scans;
+    const std::string before = table.to_yaml(false);
+    table.read_yaml(profile_text(profile), "profile " + profile, &for_scans);
     note_yaml(table, profile_text(profile), "profile " + profile, origins);
-    if (!passed_over.empty())
-      log.info("profile " + profile +
-               ": these settings do not exist for stems and are ignored: " + joined(passed_over));
+    if (table.to_yaml(false) == before)
+      log.info("profile " + profile + " changes nothing for stems: its settings are for scans");
   });
   problems.gather([&] {
     if (file.empty()) return;
