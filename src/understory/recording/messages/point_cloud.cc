@@ -121,8 +121,8 @@ class SlotReader {
 
   T operator()(const std::uint8_t* raw) const {
     if (usual_) return load<T, T>(raw + slot_.offset, false);
-    if constexpr (std::is_same_v<T, std::uint16_t>)
-      return to_ring(slot_.read(raw));
+    if constexpr (std::is_integral_v<T>)
+      return static_cast<T>(to_ring(slot_.read(raw)));
     else
       return static_cast<T>(slot_.read(raw));
   }
@@ -139,13 +139,13 @@ struct RelativeTimes {
   CloudLayout::Slot slot;
   TimeNs header = 0;
   TimeNs foreign_start = 0;  // first point's time on the foreign clock
+  TimeNs unit_ns = ns_per_unit(convention.unit_s);
 
   [[nodiscard]] TimeNs operator()(const std::uint8_t* raw) const {
     // Whole numbers of 32 bits need no rounding: the usual case is computed without it.
-    const TimeNs time =
-        slot.type == FieldType::kUint32 && !slot.swap
-            ? load<TimeNs, std::uint32_t>(raw + slot.offset, false) * ns_per_unit(convention.unit_s)
-            : raw_time_to_ns(slot.read(raw), convention.unit_s);
+    const TimeNs time = slot.type == FieldType::kUint32 && !slot.swap
+                            ? load<TimeNs, std::uint32_t>(raw + slot.offset, false) * unit_ns
+                            : raw_time_to_ns(slot.read(raw), convention.unit_s);
     switch (convention.kind) {
       case TimeConvention::Kind::kOffset:
         return time + convention.shift;
@@ -281,7 +281,7 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
   scan.has_point_times = convention.kind != TimeConvention::Kind::kNone && layout.time().size > 0;
   scan.stamp = cloud.header.stamp + convention.shift;
   const bool rows_are_rings = !layout.has_ring() && cloud.height > 1 && cloud.height <= kMostRings;
-  RelativeTimes relative_time{convention, layout.time(), cloud.header.stamp, 0};
+  RelativeTimes relative_time{convention, layout.time(), cloud.header.stamp};
   if (convention.kind == TimeConvention::Kind::kForeignClock)
     relative_time.foreign_start =
         raw_time_to_ns(measure_times(cloud, layout, 0).low, convention.unit_s);
@@ -293,6 +293,8 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
   const PositionReader read_position(layout);
   const SlotReader<float, FieldType::kFloat32> read_intensity(layout.intensity());
   const SlotReader<std::uint16_t, FieldType::kUint16> read_ring(layout.ring());
+  const SlotReader<std::uint8_t, FieldType::kUint8> read_return(layout.return_index());
+  const SlotReader<std::uint8_t, FieldType::kUint8> read_tag(layout.tag());
   for_each_point(cloud, [&](const std::uint8_t* raw, std::size_t row) {
     ScanPoint point;
     if (!read_position(raw, point)) {
@@ -314,10 +316,8 @@ ConvertedCloud convert_cloud(const PointCloud2Message& cloud, const CloudLayout&
     }
     if (layout.has_ring()) point.ring = read_ring(raw);
     if (rows_are_rings) point.ring = static_cast<std::uint16_t>(row);
-    if (layout.return_index().size > 0)
-      point.return_index = static_cast<std::uint8_t>(to_ring(layout.return_index().read(raw)));
-    if (layout.tag().size > 0)
-      point.tag = static_cast<std::uint8_t>(to_ring(layout.tag().read(raw)));
+    if (layout.return_index().size > 0) point.return_index = read_return(raw);
+    if (layout.tag().size > 0) point.tag = read_tag(raw);
     highest_ring = std::max(highest_ring, point.ring);
     scan.points.push_back(point);
   });
