@@ -155,8 +155,9 @@ TEST(FalseLoops, ATrueReturnIsClosed) {
 TEST(FalseLoops, LevellingAppliesWhatARunningSearchFinds) {
   const Eigen::Vector3d slip(0.8, -0.6, 0.0);
   KeyframeMap::Config config = own_config();
-  config.loop_closure.handover_keyframes = 1000;
-  config.loop_closure.search.interval_s = kSteps - 2;  // one search, of the place of the return
+  config.loop_closure.handover_keyframes = 10;
+  // A second search begins at the return, and is due behind the end of the walk.
+  config.loop_closure.search.interval_s = kSteps - 2;
   const test::TemporaryFolder folder;
   StageTimes times;
   Log log;
