@@ -13,8 +13,8 @@ endif()
 #   OPTIMISED          the compiler's option where it is not the usual one. -O1 suits layers in which no time is spent
 #   APART              further ones that are compiled by themselves, also with UNDERSTORY_UNITY: names in
 #                      them clash with others', or their loops are to be optimised for themselves
-#   COLD               further ones in which no time is spent: united apart from the others, and optimised by -O1, which
-#                      the compiler does in two thirds of the time
+#   COLD               further ones in which no time is spent. They are united apart from the others and compiled with
+#                      -O1, which takes two thirds of the time
 #   TESTS              x_test.cc beside x.cc; together the GoogleTest program test_<name>
 #   DEPENDS            layers before it in the order of the top CMakeLists.txt (PUBLIC)
 #   LIBRARIES          third-party targets that its headers need (PUBLIC)
