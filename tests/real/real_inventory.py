@@ -116,6 +116,21 @@ def columns(cloud, low_m=1.0, high_m=5.0, slices=20, filled=16, cell_m=0.05):
             yield tuple((np.min(group, axis=0) + np.max(group, axis=0) + 1) / 2 * cell_m)
 
 
+def check_laid_otherwise(folder):
+    """The plantation mirrored, and without every seventh point: circles of two whorls were taken for stems."""
+    las = laspy.read(PLANTATION)
+    points = np.array(las.xyz)
+    left = points[np.arange(len(points)) % 7 != 0]
+    for name, laid, sign in (("mirrored", points * [-1, 1, 1], -1), ("thinned", left, 1)):
+        header = laspy.LasHeader(point_format=0, version="1.2")
+        header.scales, header.offsets = [0.001] * 3, laid.min(axis=0)
+        cloud = laspy.LasData(header)
+        cloud.xyz = laid
+        cloud.write(str(folder / f"{name}.laz"))
+        trees = inventory(folder / f"{name}.laz", folder)
+        check_stems(trees, [(sign * x, y) for x, y in PLANTATION_STEMS], f"plantation, {name}")
+
+
 def check_halves(cloud, folder):
     las = laspy.read(cloud)
     lists = []
@@ -154,6 +169,7 @@ def main():
         plantation = inventory(PLANTATION, folder)
         check_stems(plantation, PLANTATION_STEMS, "plantation")
         check_stems(plantation, list(columns(PLANTATION)), "plantation, columns of points")
+        check_laid_otherwise(folder)
         check_halves(MOBILE, folder)
         check_diameters(mobile, [t for t in inventory(FLOWN, folder) if "dbh_m" in t])
     return 0

@@ -97,6 +97,9 @@ inline constexpr double kFewSlicesSd = 0.35;
 inline constexpr double kThickSlices = 3.0;
 // Thick slices that show a stem at least [probed]
 inline constexpr int kLeastThickSlices = 2;
+// m: radius of what shows in no more thick slices than these, at most. Two whorls of branches make
+// such circles [tuned on `treels/pine_plot` laid otherwise: whorls have 18 to 22 cm]
+inline constexpr double kMostOfFewThickSlices = 0.15;
 // m that the slices of a search for hidden stems lie higher [chosen: feet that are hidden to 3 m,
 // to 4 m]
 inline constexpr std::array<double, 2> kHiddenRises = {1.0, 2.0};

@@ -165,6 +165,16 @@ struct Search {
   }
 };
 
+// A thick circle with many points that only the fewest thick slices showed: two whorls make one.
+// Where points are few, a far stem shows in no more.
+bool is_of_whorls(const StemFit& start, const StemEvidence& evidence, const SliceCut& cut,
+                  const StemDetectorConfig& config) {
+  return cut.min_slices < config.min_slices &&
+         start.slices.size() <= static_cast<std::size_t>(cut.min_slices) &&
+         start.radius_m > kMostOfFewThickSlices &&
+         evidence.on > kDensePointsPerSlice * evidence.slices;
+}
+
 // The points near a stem that no other one explains.
 std::vector<SlicePoint> unexplained_near(const Search& search, const StemFit& stem,
                                          const StemDetectorConfig& config) {
@@ -191,7 +201,8 @@ StemCandidate fit_start(const Search& search, const StemFit& start, const SliceC
   if (plain || is_flat_column(fit, cut, config)) {
     fit = refine_stem(near, fit, config);
     fit.flat = !plain;
-    if (is_stem_still(fit, cut, config) && is_tree(fit.stem, search.index, search.points, config))
+    if (is_stem_still(fit, cut, config) && !is_of_whorls(start, fit.evidence, cut, config) &&
+        is_tree(fit.stem, search.index, search.points, config))
       return {fit, std::move(near)};
   }
   fit.converged = false;
