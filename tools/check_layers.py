@@ -3,7 +3,8 @@
 
 The order of the layers is the list in the top CMakeLists.txt. A file may include its own layer and
 those before it; nothing else inside the project, and nothing by a relative path. Fails, too, on a
-folder of more than 40 files, a file of more than 500 lines, and two headers of one name.
+folder of more than 40 files, a file of more than 500 lines, and two headers of one name. A fuzz target
+that takes single files of a high layer (ALONE) must have those of all headers that they include.
 
     check_layers.py [SOURCE_TREE]     exit 0: in order; 1: prints each wrong arrow; 2: no such tree
 """
@@ -16,6 +17,7 @@ MOST_FILES = 40
 MOST_LINES = 500
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"')
+FUZZ_TARGET = re.compile(r"understory_fuzz\((\w+)([^)]*)\)")
 LAYERS = re.compile(r"foreach\(layer IN ITEMS\s+([a-z_\s]+)\)")
 
 
@@ -55,6 +57,25 @@ def untidy(tree, root):
             yield f"{folder.relative_to(tree)}: {len(files)} files, {MOST_FILES} at most"
 
 
+def unlinked(tree, root, order):
+    """Yields one line for each file that a fuzz target needs beside its ALONE files, and lacks."""
+    listed = tree / "fuzz" / "CMakeLists.txt"
+    for target, rest in FUZZ_TARGET.findall(listed.read_text(encoding="utf-8")) if listed.is_file() else ():
+        words = rest.split()
+        if "ALONE" not in words:
+            continue
+        top = max((order.index(word) for word in words if word in order), default=-1)
+        alone = words[words.index("ALONE") + 1:]
+        for name in alone:
+            for line in (root / name).read_text(encoding="utf-8").splitlines():
+                found = INCLUDE.match(line)
+                header = found.group(1).removeprefix("understory/") if found else ""
+                source = header.removesuffix(".h") + ".cc"
+                above = header.split("/")[0] in order and order.index(header.split("/")[0]) > top
+                if above and source not in alone and (root / source).is_file():
+                    yield f"fuzz/CMakeLists.txt: {target}: {name} needs {source}, which is not among its ALONE files"
+
+
 def check(tree):
     """Yields one line for each wrong include of a source tree, and for what is untidy in it."""
     order = layer_order(tree)
@@ -71,6 +92,7 @@ def check(tree):
             if reason:
                 yield f'{name}:{number}: includes "{found.group(1)}": {reason}'
     yield from untidy(tree, root)
+    yield from unlinked(tree, root, order)
 
 
 def main():

@@ -16,7 +16,7 @@ def findings(files):
         tree = pathlib.Path(folder)
         (tree / "CMakeLists.txt").write_text("foreach(layer IN ITEMS\n    util geometry cli)\n")
         for name, text in files.items():
-            path = tree / "src" / "understory" / name
+            path = tree / name if name.startswith("fuzz/") else tree / "src" / "understory" / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
         return list(check_layers.check(tree))
@@ -54,6 +54,16 @@ class CheckLayers(unittest.TestCase):
         self.assertIn("geometry/a.h:1: 501 lines", "\n".join(found))
         self.assertIn("src/understory/cli/a.h has this name, too", "\n".join(found))
         self.assertIn("src/understory/util: 41 files", "\n".join(found))
+
+    def test_a_fuzz_target_has_the_files_of_what_its_single_files_include(self):
+        files = {"util/a.h": "", "util/a.cc": "", "cli/only.h": "", "cli/other.h": "", "cli/other.cc": "",
+                 "cli/one.cc": '#include "understory/util/a.h"\n#include "understory/cli/only.h"\n'
+                               '#include "understory/cli/other.h"\n'}
+        target = "understory_fuzz(x SOURCE x_fuzz.cc LAYERS util ALONE cli/one.cc{})\n"
+        found = findings({**files, "fuzz/CMakeLists.txt": target.format("")})
+        self.assertEqual(len(found), 1)
+        self.assertIn("x: cli/one.cc needs cli/other.cc", found[0])
+        self.assertEqual(findings({**files, "fuzz/CMakeLists.txt": target.format("\n  cli/other.cc")}), [])
 
     def test_the_project_itself_has_a_readable_order(self):
         here = pathlib.Path(__file__).resolve().parent.parent
