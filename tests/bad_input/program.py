@@ -62,7 +62,7 @@ def snapshot(folder):
 SOURCE = pathlib.Path(__file__).resolve().parent.parent.parent
 BUILD = pathlib.Path(os.environ.get("UNDERSTORY_BUILD", pathlib.Path(PROGRAM).parent))
 CACHE = pathlib.Path(os.environ.get("UNDERSTORY_CACHE", pathlib.Path.home() / ".cache" / "understory"))
-KEPT_DAYS = 3  # recordings that no test asked for so long are removed
+KEPT_MAKERS = 2  # what other programs or simulators made is removed when nobody asked for it for an hour
 
 
 def digest(files, *texts):
@@ -89,13 +89,17 @@ def simulator():
 
 def made_once(words, make, made_by=None, shared=BUILD / "tests" / "recordings"):
     """A folder that `make(folder)` fills once for all tests. Its name tells `words` and who made it, by default this
-    program. What nobody asked for in some days goes. Tests read what lies there, and write elsewhere."""
+    program. What the last ones but two made goes. Tests read what lies there, and write elsewhere."""
     shared.mkdir(parents=True, exist_ok=True)
     name = f"{made_by or digest((PROGRAM, __file__))}-{hashlib.sha256(repr(words).encode()).hexdigest()[:16]}"
     with open(shared / "lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
+        asked = {}
         for path in shared.glob("*-*"):
-            if path.stat().st_mtime < time.time() - KEPT_DAYS * 86_400:
+            maker = path.name.split("-")[0]
+            asked[maker] = max(asked.get(maker, 0), path.stat().st_mtime)
+        for maker in sorted(asked, key=asked.get, reverse=True)[KEPT_MAKERS:]:
+            for path in shared.glob(f"{maker}-*") if asked[maker] < time.time() - 3600 else ():
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
         own = open(shared / f"{name}.lock", "w")
     with own:
