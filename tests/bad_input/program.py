@@ -76,13 +76,18 @@ def digest(files, *texts):
 
 @functools.cache
 def simulator():
-    """What decides the bytes of a simulated recording: the sources of the simulator, and how they were compiled."""
+    """What decides the bytes of a simulated recording: the sources of the simulator, and how they were compiled. A program
+    that was not built here, or before the sources changed, stands for itself."""
     layers = [SOURCE / "src" / "understory" / layer for layer in ("util", "geometry", "sensor", "recording", "simulation")]
     files = [file for layer in layers for pattern in ("*.cc", "*.h", "*.in", "*.txt") for file in layer.rglob(pattern)
              if not file.name.endswith("_test.cc")]
     files += [SOURCE / "src" / "understory" / "cli" / "simulate.cc", SOURCE / "CMakePresets.json",
               *(SOURCE / "cmake").glob("*.cmake"), *(SOURCE / "configs" / "sites").glob("*.yaml")]
-    flags = [line for line in (BUILD / "CMakeCache.txt").read_text().splitlines()
+    settings, built = BUILD / "CMakeCache.txt", pathlib.Path(PROGRAM)
+    own = settings.is_file() and built.resolve() == (BUILD / "understory").resolve()
+    if not own or built.stat().st_mtime < max(file.stat().st_mtime for file in files):
+        return digest((PROGRAM,))
+    flags = [line for line in settings.read_text().splitlines()
              if line.startswith(("CMAKE_BUILD_TYPE", "CMAKE_CXX", "UNDERSTORY_MARCH", "UNDERSTORY_SANITIZERS", "UNDERSTORY_UNITY"))]
     return digest(sorted(files), *flags)
 
