@@ -2,15 +2,17 @@
 """What each number does that is no setting: the tables of constants (`src/understory/*/*_constants.h`).
 
     ./run bench constants [--header forest/stem_constants.h] [--names KEY ...] [--factors 0.8 1.25]
-                          [--only "not recorded"] [--work FOLDER] RUN TRUTH [RUN TRUTH ...]
+                          [--only "not recorded"] [--command map|correct] [--words WORDS] [--work FOLDER]
+                          RUN TRUTH [RUN TRUTH ...]
 
 The command builds the program once more, in --work, from a copy of the sources. There each number of --header is read
 from the environment. Then it measures all pairs with each number times each of --factors. Whole numbers are changed by
 one at least. RUN is a folder of `understory map`, TRUTH the one of `understory simulate` beside its recording.
 
 What is measured depends on the header. The layer `forest`: `understory inventory RUN`, compared with the true trees.
-Other layers: RUN is a recording, and `understory map RUN --front-end sparse` (`--map WORDS`: other words) is compared with
-the true path and the true trees. A line tells a figure's change by the number. The first line is that of the program as it is.
+Other layers: RUN is a recording, and `understory map RUN --front-end sparse` (`--words`: other ones) is compared with
+the true path and the true trees. With `--command correct` RUN is a run by stems, and `understory correct RUN` is compared.
+A line tells a figure's change by the number. The first line is that of the program as it is.
 
 A number that the compiler has to know is left out, and named. A key is `file::kName`, as the tables write it."""
 
@@ -159,11 +161,11 @@ def evaluated(*words):
     return json.loads(done.stdout)
 
 
-def map_figures(built_program, pairs, key, value, work, words):
+def map_figures(built_program, pairs, key, value, work, command, words):
     ape, found, false, dbh = [], [], [], []
     for recording, truth in pairs:
         folder = pathlib.Path(tempfile.mkdtemp(dir=work))
-        done = subprocess.run([str(built_program), "--quiet", "map", recording, "-o", str(folder / "r"), "--threads", "1", *words],
+        done = subprocess.run([str(built_program), "--quiet", command, recording, "-o", str(folder / "r"), "--threads", "1", *words],
                               capture_output=True, text=True, env=environment(key, value))
         if done.returncode not in (0, 4):
             return None
@@ -173,10 +175,10 @@ def map_figures(built_program, pairs, key, value, work, words):
         ape.append(100 * path["ape_rmse_m"])
         found.append(trees["matched"])
         false.append(trees["trees_a"] - trees["matched"])
-        dbh.append(trees["dbh_rmse_m"])
+        dbh.append(np.nan if trees["dbh_rmse_m"] is None else trees["dbh_rmse_m"])
         shutil.rmtree(folder)
     return {"APE cm": float(np.mean(ape)), "worst APE cm": max(ape), "found": sum(found), "false": sum(false),
-            "diameter RMSE cm": 100 * float(np.sqrt(np.mean(np.square(dbh))))}
+            "diameter RMSE cm": 100 * float(np.sqrt(np.nanmean(np.square(dbh))))}
 
 
 def line_of(name, figures, base):
@@ -193,7 +195,8 @@ def main():
     parser.add_argument("--names", nargs="+", default=[])
     parser.add_argument("--factors", nargs="+", type=float, default=[0.8, 1.25])
     parser.add_argument("--only", default="")
-    parser.add_argument("--map", default="--front-end sparse")
+    parser.add_argument("--command", choices=("map", "correct"), default="map")
+    parser.add_argument("--words")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--work", type=pathlib.Path, default=program.TOP / "out" / "constants")
     args = parser.parse_args()
@@ -207,7 +210,8 @@ def main():
     def measured(key="", value=0.0):
         if args.header.startswith("forest/"):
             return inventory_figures(changed, pairs, key, value, args.work)
-        return map_figures(changed, pairs, key, value, args.work, args.map.split())
+        words = args.words if args.words is not None else "--front-end sparse" if args.command == "map" else ""
+        return map_figures(changed, pairs, key, value, args.work, args.command, words.split())
 
     base = measured()
     print("| number, set to | " + " | ".join(base) + " |\n|" + "---|" * (1 + len(base)))

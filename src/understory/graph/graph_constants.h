@@ -10,6 +10,7 @@
 //   chosen   by judgement, fitted to nothing
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+//   probed   what a fifth less and a quarter more change, docs/method/constants.md
 //   not recorded   in use for long, and nothing tells why it is this number
 // or real clouds and measurements by their page.
 namespace understory::graph_constants {
@@ -65,15 +66,15 @@ inline constexpr double kStepTilt = 0.2 * kRadPerDegree;
 inline constexpr double kStandLeans = 0.3 * kRadPerDegree;
 // m of way to each side whose views see the same trees [chosen]
 inline constexpr double kSameTrees = 10.0;
-// rad: tilt of a step with little overlap, one standard deviation [not recorded]
+// rad: tilt of a step with little overlap, one standard deviation [probed: no figure]
 inline constexpr double kWeakTilt = 0.5 * kRadPerDegree;
-// m: shift of such a step, one standard deviation [not recorded]
+// m: shift of such a step, one standard deviation [probed: no figure]
 inline constexpr double kWeakShift = 0.05;
-// rad: yaw that both views of a step get wrong alike, one standard deviation [not recorded]
+// rad: yaw that both views of a step get wrong alike, one standard deviation [probed: no figure]
 inline constexpr double kStepYaw = 0.02 * kRadPerDegree;
-// m: shift that they get wrong alike, one standard deviation ... [not recorded]
+// m: shift that they get wrong alike, one standard deviation ... [probed: no figure]
 inline constexpr double kStepShift = 0.005;
-// ... and of the length of the step, added [not recorded]
+// ... and of the length of the step, added [probed: no figure]
 inline constexpr double kStepShiftShare = 0.01;
 }  // namespace stem_correction
 
@@ -85,17 +86,19 @@ inline constexpr double kMergeL0 = 0.2;
 inline constexpr double kSeenShare = 0.25;
 // views around a place, to each side, among which the nearest one is looked for [chosen]
 inline constexpr int kNeighbourhood = 30;
-// Factor on the covariance of ICP [not recorded]
+// Factor on the covariance of ICP [probed: no figure]
 inline constexpr double kLoopVariance = 9.0;
-// rad: tilt of a loop, one standard deviation [not recorded]
+// rad: tilt of a loop, one standard deviation [probed: no figure]
 inline constexpr double kLoopTilt = 0.5 * std::numbers::pi / 180.0;
-// rad: yaw that both views of a loop get wrong alike, one standard deviation [not recorded]
+// rad: yaw that both views of a loop get wrong alike, one standard deviation [probed: no figure]
 inline constexpr double kLoopYaw = 0.1 * std::numbers::pi / 180.0;
-// L0: shift that they get wrong alike, one standard deviation [not recorded]
+// L0: shift that they get wrong alike, one standard deviation [probed: x 0.8 no figure; x 1.25 -1
+// loop]
 inline constexpr double kLoopShiftL0 = 0.02;
-// Of the overlap with the first view: the nearest one is taken if it has that much [not recorded]
+// Of the overlap with the first view: the nearest one is taken if it has that much [probed: x 0.8
+// no byte; x 1.25 no figure]
 inline constexpr double kNearestOverlap = 0.8;
-// Of the least overlap: with less no other view is tried [not recorded]
+// Of the least overlap: with less no other view is tried [probed: no byte]
 inline constexpr double kHopeless = 0.5;
 // Standard deviations by which two views lie nearer than the largest distance [chosen]
 inline constexpr double kSureSigmas = 2.0;
@@ -135,7 +138,7 @@ inline constexpr double kAngleShare = 0.98;
 namespace pair_matching {  // graph/stem_matching/pair_matching.cc
 // Outlier ratio of a match at most [chosen]
 inline constexpr double kMostOutliers = 0.9;
-// Factor on the covariance of ICP [not recorded]
+// Factor on the covariance of ICP [probed: no figure]
 inline constexpr double kMatchVariance = 4.0;
 // rad: tilt of a match, one standard deviation [docs/method/sparse.md: feet look higher the
 // farther they are]
@@ -143,9 +146,9 @@ inline constexpr double kMatchTilt = 2.0 * std::numbers::pi / 180.0;
 // m: height of a match, one standard deviation [docs/method/sparse.md: with 0.15 m the correction
 // made lieksa3 worse in space]
 inline constexpr double kMatchHeight = 0.5;
-// rad: yaw that both views of a match get wrong alike, one standard deviation [not recorded]
+// rad: yaw that both views of a match get wrong alike, one standard deviation [probed: no figure]
 inline constexpr double kMatchYaw = 0.03 * std::numbers::pi / 180.0;
-// L0: shift that they get wrong alike, one standard deviation [not recorded]
+// L0: shift that they get wrong alike, one standard deviation [probed: no figure]
 inline constexpr double kMatchShiftL0 = 0.02;
 }  // namespace pair_matching
 
@@ -154,7 +157,7 @@ namespace tree_pattern {  // graph/stem_matching/tree_pattern.cc
 inline constexpr std::size_t kMostStems = 65'535;
 // L0: side of a triangle at least; small triangles look alike [chosen]
 inline constexpr double kShortestSide = 1.0;
-// Triangles that have to agree on a place [not recorded]
+// Triangles that have to agree on a place [probed: no byte]
 inline constexpr int kFewestVotes = 3;
 // Cells of the heading in which triangles vote [chosen: 15 degrees]
 inline constexpr int kYawCells = 24;
@@ -179,11 +182,11 @@ inline constexpr double kSpacingStep = 0.8;
 }  // namespace correction_pairs
 
 namespace expected_gain {  // graph/loops/expected_gain.cc
-// L0: stems of joined views that are nearer are one [not recorded]
+// L0: stems of joined views that are nearer are one [probed: no figure]
 inline constexpr double kGatherL0 = 0.15;
-// Factor on the variance of the odometry at least [not recorded]
+// Factor on the variance of the odometry at least [probed: no figure]
 inline constexpr double kLeastScale = 0.1;
-// The same at most [not recorded]
+// The same at most [probed: no byte]
 inline constexpr double kMostScale = 1e4;
 }  // namespace expected_gain
 
