@@ -14,7 +14,8 @@ inline constexpr std::array<double, 2> kBands = {0.01, 0.025};
 inline constexpr double kReach = 0.08;
 // Of the radius of the thinnest stem: smaller circles are not kept [as in stem_detector]
 inline constexpr double kLeastRadiusShare = 0.4;
-// m from the surface: points that a fit looks at [as kRefineReach of stem_fit and what lies beyond]
+// m from the surface: points that a fit looks at [as NoisyCylinderConfig::stray_reach_m and what
+// lies beyond]
 inline constexpr double kFitReach = 0.35;
 // m: scatter of the sharpest clouds [as in stem_fit]
 inline constexpr double kLeastScatter = 0.004;

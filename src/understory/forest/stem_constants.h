@@ -146,10 +146,6 @@ inline constexpr double kSameOfBoth = 0.85;
 // So are stems whose centres are nearer than the larger radius and this share of the smaller one
 // [not recorded]
 inline constexpr double kSameOfSmaller = 0.3;
-// Scatters: points so near to the surface are those of the stem [not recorded]
-inline constexpr double kClaimScatters = 2.5;
-// m: the same at least [not recorded]
-inline constexpr double kClaimBand = 0.015;
 // m: diameter of a thin stem within foliage at most: a thicker one shows its surface [chosen]
 inline constexpr double kFoliageDbh = 0.1;
 // m around the radius in which points of a leaning stem are looked for [not recorded]
@@ -252,6 +248,17 @@ inline constexpr double kOffLine = 0.04;
 inline constexpr double kOffLineShare = 0.2;
 }  // namespace ring_linker
 
+namespace surface_band {  // forest/stems/surface_band.h
+// Scatters: points so near to the surface are on it [not recorded]
+inline constexpr double kBandScatters = 2.5;
+// m: the same at least [not recorded]
+inline constexpr double kLeastBand = 0.015;
+// Bands under the surface from which on a point is inside ... [not recorded]
+inline constexpr double kInsideBands = 2.0;
+// ... or radii under it, whichever is more [not recorded]
+inline constexpr double kInsideShare = 0.3;
+}  // namespace surface_band
+
 namespace stem_fit {  // forest/stems/stem_fit.cc
 // m/m: radius lost per metre of height in a stem's lower part [chosen]
 inline constexpr double kUsualTaper = -0.008;
@@ -277,14 +284,6 @@ inline constexpr std::size_t kEnoughPoints = 400;
 inline constexpr double kReachScatters = 4.0;
 // m from the surface of the start: points that a fit takes [not recorded]
 inline constexpr double kSampleReach = 0.15;
-// Scatters: points so near to the surface are on it [not recorded]
-inline constexpr double kBandScatters = 2.5;
-// m: the same at least [not recorded]
-inline constexpr double kLeastBand = 0.015;
-// Bands under the surface from which on a point is inside ... [not recorded]
-inline constexpr double kInsideBands = 2.0;
-// ... or radii under it, whichever is more [not recorded]
-inline constexpr double kInsideShare = 0.3;
 // m: radius of a thin start at least [not recorded]
 inline constexpr double kThinRadius = 0.02;
 // Spreads of the points in the plane that make its radius [not recorded]
@@ -303,8 +302,6 @@ inline constexpr double kLeastRadiusShare = 0.3;
 inline constexpr int kFixedScatterSteps = 3;
 // m: a fit whose step is shorter has ended [not recorded]
 inline constexpr double kSettled = 2e-4;
-// m outside of the surface: points that the noisy cylinder is fitted to [not recorded]
-inline constexpr double kRefineReach = 0.1;
 // Radii: with more scatter a thin stem is tried as well [not recorded]
 inline constexpr double kThinTryScatter = 0.12;
 // Share of the directions that show a surface: with less a thin stem is tried [not recorded]

@@ -168,14 +168,6 @@ inline constexpr double kMostThickerShare = 0.05;
 inline constexpr double kMostThicker = 0.005;
 // Radii: the growth from section to section towards the roots [chosen]
 inline constexpr double kFlare = 0.5;
-// Scatters: points so near to the surface are on it [as in stem_fit]
-inline constexpr double kBandScatters = 2.5;
-// m: the same at least [as in stem_fit]
-inline constexpr double kLeastBand = 0.015;
-// Bands under the surface from which on a point is inside ... [as in stem_fit]
-inline constexpr double kInsideBands = 2.0;
-// ... or radii under it, whichever is more [as in stem_fit]
-inline constexpr double kInsideShare = 0.3;
 // Points inside a section over those on it at most [chosen]
 inline constexpr double kMostInside = 0.3;
 // Points on a section at least [chosen]

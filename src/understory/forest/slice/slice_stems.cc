@@ -18,7 +18,7 @@ namespace understory {
 namespace {
 
 using namespace stem_constants::slice_stems;
-using stem_constants::stem_fit::kBandScatters;
+using stem_constants::surface_band::kBandScatters;
 
 std::vector<Circle> circles_of(const std::vector<SlicePoint>& points,
                                const StemDetectorConfig& config, const ProgressSink& progress) {

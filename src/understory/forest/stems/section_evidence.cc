@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "understory/forest/stem_curve_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/stem_axis.h"
+#include "understory/forest/stems/surface_band.h"
 
 namespace understory {
 namespace {
-
-using namespace stem_constants::stem_curve;
 
 // All of the circumference but the widest gap between the directions (rad), in degrees. A scanner
 // sees one side of a stem, and of n points over an arc the outermost leave 2 / (n + 1) of it out.
@@ -29,8 +27,8 @@ double seen_arc_deg(std::vector<double>& turns) {
 
 SectionEvidence section_evidence(const std::vector<SlicePoint>& points, const StemFit& fit,
                                  double scatter_m) {
-  const double band = std::max(kBandScatters * scatter_m, kLeastBand);
-  const double within = -std::max(kInsideBands * band, kInsideShare * fit.radius_m);
+  const double band = surface_band_m(scatter_m);
+  const double within = inside_from_m(band, fit.radius_m);
   SectionEvidence evidence;
   ArcBins arc;
   std::vector<double> turns;

@@ -15,6 +15,7 @@
 #include "understory/forest/stems/point_index.h"
 #include "understory/forest/stems/stem_criteria.h"
 #include "understory/forest/stems/stem_fit.h"
+#include "understory/forest/stems/surface_band.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 #include "understory/util/stable_sort.h"
@@ -92,7 +93,7 @@ void sort_by_support(std::vector<StemCandidate>& fits) {
 int unclaimed_returns(const StemFitResult& fit, const PointIndex& index,
                       const std::vector<SlicePoint>& points, const std::vector<char>& explained) {
   const StemAxis axis(fit.stem);
-  const double band = std::max(kClaimScatters * fit.evidence.scatter_m, kClaimBand);
+  const double band = surface_band_m(fit.evidence.scatter_m);
   std::uint64_t returns = 0;
   index.near(fit.stem.centre, fit.stem.radius_m + kLeanReach, [&](std::size_t i) {
     if (explained[i] == 0 && std::abs(axis.surface_error(points[i])) <= band)

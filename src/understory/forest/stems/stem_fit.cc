@@ -8,6 +8,7 @@
 #include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/noisy_cylinder.h"
+#include "understory/forest/stems/surface_band.h"
 #include "understory/geometry/matrix_inverse.h"
 #include "understory/geometry/symmetric_solver.h"
 #include "understory/util/median.h"
@@ -188,8 +189,8 @@ void judge(const std::vector<SlicePoint>& points, const StemDetectorConfig& conf
   const double scatter = result.evidence.scatter_m;
   StemEvidence evidence;
   evidence.scatter_m = scatter;
-  const double band = std::max(kBandScatters * scatter, kLeastBand);
-  const double within = -std::max(kInsideBands * band, kInsideShare * stem.radius_m);
+  const double band = surface_band_m(scatter);
+  const double within = inside_from_m(band, stem.radius_m);
   ArcBins arc;
   Outline outline;
   Patches patches(config);
@@ -347,15 +348,16 @@ StemFitResult refine_stem(const std::vector<SlicePoint>& points, const StemFitRe
                           const StemDetectorConfig& config) {
   StemFit start = fit.stem;
   start.rms_m = fit.evidence.scatter_m;
+  const NoisyCylinderConfig usual;
   std::vector<SlicePoint> near;
   const StemAxis axis(start);
   for (const SlicePoint& point : points) {
-    if (axis.surface_error(point) < kRefineReach) near.push_back(point);
+    if (axis.surface_error(point) < usual.stray_reach_m) near.push_back(point);
   }
-  NoisyCylinder best = fit_noisy_cylinder(near, start, {});
+  NoisyCylinder best = fit_noisy_cylinder(near, start, usual);
   if (fit.evidence.scatter_m > kThinTryScatter * start.radius_m ||
       fit.evidence.fill < kThinTryFill || fit.evidence.even_arc_deg < kThinTryArc * start.arc_deg) {
-    const NoisyCylinder thin = fit_noisy_cylinder(near, thin_start(near, start), {});
+    const NoisyCylinder thin = fit_noisy_cylinder(near, thin_start(near, start), usual);
     // It must not win by leaving out the half of a stem that was seen in few points.
     if (thin.converged && (!best.converged || (thin.log_likelihood > best.log_likelihood &&
                                                thin.strays < best.strays + kThinStrays)))
