@@ -10,9 +10,8 @@
 //   chosen   by judgement, fitted to nothing
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
-//   probed   a fifth less or a quarter more finds or loses two of 636 stems at most, as
-//            ./run bench constants shows.
-//   not recorded   in use for long, and nothing tells why it is this number
+//   probed   what a fifth less and a quarter more change, docs/method/constants.md. Where nothing
+//            follows: two of 636 stems at most
 // or real clouds and measurements by their page.
 namespace understory::stem_constants {
 
@@ -135,26 +134,30 @@ inline constexpr int kDensePointsPerSlice = 12;
 inline constexpr double kMostScatter = 0.012;
 // ... radii, whichever is more ... [probed]
 inline constexpr double kMostScatterShare = 0.2;
-// ... and m, added to either [not recorded]
+// ... and m, added to either [probed: x 0.8 no figure; x 1.25 no byte]
 inline constexpr double kScatterSlack = 0.008;
-// Share of all slices that show a stem without a doubt [not recorded]
+// Share of all slices that show a stem without a doubt [probed: x 0.8 +2 stems, +1 false; x 1.25 -2
+// stems]
 inline constexpr double kShownByMost = 0.8;
-// Share of all slices below which a piece that was seen well is cut off [not recorded]
+// Share of all slices below which a piece that was seen well is cut off [probed: no byte]
 inline constexpr double kShownByFew = 0.4;
-// Stems whose centres are nearer than this share of both radii are one [not recorded]
+// Stems whose centres are nearer than this share of both radii are one [probed: x 0.8 no byte; x
+// 1.25 -1 false]
 inline constexpr double kSameOfBoth = 0.85;
 // So are stems whose centres are nearer than the larger radius and this share of the smaller one
-// [not recorded]
+// [probed: no byte]
 inline constexpr double kSameOfSmaller = 0.3;
 // m: diameter of a thin stem within foliage at most: a thicker one shows its surface [chosen]
 inline constexpr double kFoliageDbh = 0.1;
-// m around the radius in which points of a leaning stem are looked for [not recorded]
+// m around the radius in which points of a leaning stem are looked for [bound: 25 degrees of lean
+// over 2.2 m are 1.03 m]
 inline constexpr double kLeanReach = 1.2;
-// m beyond the radius whose points belong to a stem [not recorded]
+// m beyond the radius whose points belong to a stem [probed: x 0.8 no byte; x 1.25 no figure]
 inline constexpr double kExplainedMargin = 0.06;
-// m beyond the radius of a start in which its points are looked for [not recorded]
+// m beyond the radius of a start in which its points are looked for [bound: kFitReach and what a
+// lean adds]
 inline constexpr double kStartReach = 0.4;
-// m beyond the radius whose points enter the fit [not recorded]
+// m beyond the radius whose points enter the fit [probed: no figure]
 inline constexpr double kFitReach = 0.35;
 // m beyond a tile in which stems are looked for: they compete with those of the tile [chosen: two
 // of the largest stems and more]
@@ -236,26 +239,28 @@ inline constexpr double kLeanReach = 0.3;
 namespace ring_linker {  // forest/search/ring_linker.cc
 // m: edge of the cells in which rings of other slices are looked for [chosen]
 inline constexpr double kRingCell = 1.0;
-// m by which the radii of two rings of one stem differ at most ... [not recorded]
+// m by which the radii of two rings of one stem differ at most ... [probed: no figure]
 inline constexpr double kSameRadius = 0.03;
-// ... and of the larger radius, added [not recorded]
+// ... and of the larger radius, added [probed: no figure]
 inline constexpr double kSameRadiusShare = 0.3;
-// m to the side of a ring where the next one of a vertical stem may lie [not recorded]
+// m to the side of a ring where the next one of a vertical stem may lie [probed: x 0.8 no figure; x
+// 1.25 no byte]
 inline constexpr double kBesideReach = 0.05;
-// m that a ring may lie off the line at most ... [not recorded]
+// m that a ring may lie off the line at most ... [probed: x 0.8 +1 false; x 1.25 +1 stem]
 inline constexpr double kOffLine = 0.04;
-// ... and radii, added [not recorded]
+// ... and radii, added [probed: x 0.8 +1 false; x 1.25 no figure]
 inline constexpr double kOffLineShare = 0.2;
 }  // namespace ring_linker
 
 namespace surface_band {  // forest/stems/surface_band.h
-// Scatters: points so near to the surface are on it [not recorded]
+// Scatters: points so near to the surface are on it [probed: x 0.8 -1 false; x 1.25 +1 stem, -1
+// false]
 inline constexpr double kBandScatters = 2.5;
-// m: the same at least [not recorded]
+// m: the same at least [probed: x 0.8 no byte; x 1.25 no figure]
 inline constexpr double kLeastBand = 0.015;
-// Bands under the surface from which on a point is inside ... [not recorded]
+// Bands under the surface from which on a point is inside ... [probed: no byte]
 inline constexpr double kInsideBands = 2.0;
-// ... or radii under it, whichever is more [not recorded]
+// ... or radii under it, whichever is more [probed: no byte]
 inline constexpr double kInsideShare = 0.3;
 }  // namespace surface_band
 
@@ -280,35 +285,37 @@ inline constexpr double kLinear = 1.5;
 inline constexpr double kMapError = 0.002;
 // points that a fit takes [bound: time]
 inline constexpr std::size_t kEnoughPoints = 400;
-// Scatters beyond which a point has no weight (Tukey) [not recorded]
+// Scatters beyond which a point has no weight (Tukey) [probed: x 0.8 no figure; x 1.25 +1 stem]
 inline constexpr double kReachScatters = 4.0;
-// m from the surface of the start: points that a fit takes [not recorded]
+// m from the surface of the start: points that a fit takes [probed: x 0.8 thin +0.4 mm; x 1.25 thin
+// +0.6 mm]
 inline constexpr double kSampleReach = 0.15;
-// m: radius of a thin start at least [not recorded]
+// m: radius of a thin start at least [probed: x 0.8 no byte; x 1.25 no figure]
 inline constexpr double kThinRadius = 0.02;
-// Spreads of the points in the plane that make its radius [not recorded]
+// Spreads of the points in the plane that make its radius [probed: x 0.8 +1 false; x 1.25 no
+// figure]
 inline constexpr double kThinSpreads = 0.7;
-// m: scatter that a fit begins with at least [not recorded]
+// m: scatter that a fit begins with at least [probed: no figure]
 inline constexpr double kFirstScatter = 0.015;
-// m from the surface: points that tell the scatter [not recorded]
+// m from the surface: points that tell the scatter [probed: x 0.8 no figure; x 1.25 +1 stem]
 inline constexpr double kScatterReach = 0.05;
 // Steps of a fit at most [bound: convergence]
 inline constexpr int kMostSteps = 12;
-// m: a fit that steps farther has failed [not recorded]
+// m: a fit that steps farther has failed [probed: no byte]
 inline constexpr double kLongestStep = 0.3;
-// Of the least diameter: a fit with a smaller radius has failed [not recorded]
+// Of the least diameter: a fit with a smaller radius has failed [probed: no byte]
 inline constexpr double kLeastRadiusShare = 0.3;
-// Steps before the scatter is taken from the points [not recorded]
+// Steps before the scatter is taken from the points [probed: no figure]
 inline constexpr int kFixedScatterSteps = 3;
-// m: a fit whose step is shorter has ended [not recorded]
+// m: a fit whose step is shorter has ended [probed: no figure]
 inline constexpr double kSettled = 2e-4;
-// Radii: with more scatter a thin stem is tried as well [not recorded]
+// Radii: with more scatter a thin stem is tried as well [probed: no figure]
 inline constexpr double kThinTryScatter = 0.12;
-// Share of the directions that show a surface: with less a thin stem is tried [not recorded]
+// Share of the directions that show a surface: with less a thin stem is tried [probed: no byte]
 inline constexpr double kThinTryFill = 0.7;
-// Share of the arc that is seen evenly: with less a thin stem is tried [not recorded]
+// Share of the arc that is seen evenly: with less a thin stem is tried [probed: no byte]
 inline constexpr double kThinTryArc = 0.5;
-// Share of points off the surface that a thin stem may have more [not recorded]
+// Share of points off the surface that a thin stem may have more [probed: no figure]
 inline constexpr double kThinStrays = 0.05;
 // m outside of the surface: points that a thin stem within foliage is fitted to [chosen]
 inline constexpr double kFoliageReach = 0.06;
@@ -335,34 +342,36 @@ inline constexpr double kMostScatter = 0.06;
 inline constexpr int kViews = 24;
 // Share of a direction that gave nothing: keeps logarithms finite [bound: rounding]
 inline constexpr double kLeastView = 1e-4;
-// m: scatter that a fit begins with at least [not recorded]
+// m: scatter that a fit begins with at least [probed: no figure]
 inline constexpr double kFirstScatterLeast = 0.01;
-// m: the same at most [not recorded]
+// m: the same at most [probed: x 0.8 no figure; x 1.25 no byte]
 inline constexpr double kFirstScatterMost = 0.03;
 // Points of a fit at least [bound: six parameters]
 inline constexpr std::size_t kFewestPoints = 8;
-// m: a fit whose step is shorter has ended [not recorded]
+// m: a fit whose step is shorter has ended [probed: x 0.8 no figure; x 1.25 thin -0.4 mm]
 inline constexpr double kSettled = 4e-5;
-// Times that an extrapolation goes beyond a step at most [not recorded]
+// Times that an extrapolation goes beyond a step at most [probed: x 0.8 no figure; x 1.25 thin +0.3
+// mm, sd +1 %]
 inline constexpr double kMostStretch = 6.0;
-// Scatters between places on the circumference: the scatter blurs the gaps [not recorded]
+// Scatters between places on the circumference: the scatter blurs the gaps [probed: no figure]
 inline constexpr double kBinScatters = 0.8;
-// Places on the circumference at least [not recorded]
+// Places on the circumference at least [probed: no figure]
 inline constexpr double kFewestBins = 24.0;
 // Places on the circumference at most [bound: time]
 inline constexpr double kMostBins = 160.0;
 // Standard deviations of the angle from which a point may have come [bound: the rest is below 0.1
 // %]
 inline constexpr double kBlurReach = 3.5;
-// Share of the points that must lie on the surface [not recorded]
+// Share of the points that must lie on the surface [probed: no byte]
 inline constexpr double kLeastWeight = 0.2;
-// m: a fit with a smaller radius has failed [not recorded]
+// m: a fit with a smaller radius has failed [probed: no byte]
 inline constexpr double kLeastRadius = 0.008;
-// m: a fit that goes farther from its start has failed [not recorded]
+// m: a fit that goes farther from its start has failed [probed: no byte]
 inline constexpr double kFarthest = 0.5;
-// Share of points off the surface that a fit begins with [not recorded]
+// Share of points off the surface that a fit begins with [probed: x 0.8 no figure; x 1.25 RMSE -0.6
+// mm]
 inline constexpr double kFirstStrays = 0.05;
-// The same at least [not recorded]
+// The same at least [probed: no figure]
 inline constexpr double kLeastStrays = 0.005;
 // Rounds in which the seen directions are found [bound: convergence]
 inline constexpr int kViewRounds = 4;
@@ -410,13 +419,15 @@ inline constexpr int kStretch = 64;
 inline constexpr double kRefineMargin = 0.1;
 // Points of a group that are sorted anew when the lowest of them goes, at most [bound: time]
 inline constexpr std::size_t kMostSortedAnew = 500'000;
-// Share of the seen arc that has to be seen evenly [not recorded]
+// Share of the seen arc that has to be seen evenly [probed: x 0.8 no byte; x 1.25 no figure]
 inline constexpr double kEvenArcShare = 0.3;
-// Bands: scatter of a circle at most, or ... [not recorded]
+// Bands: scatter of a circle at most, or ... [probed: x 0.8 +1 stem, -1 false, thin +0.9 mm; x 1.25
+// RMSE -0.6 mm, sd +1 %]
 inline constexpr double kMostScatterBands = 0.6;
-// ... radii, whichever is more [not recorded]
+// ... radii, whichever is more [probed: no figure]
 inline constexpr double kMostScatterShare = 0.12;
-// m: distances of the three points that a circle is drawn through, in turn [not recorded]
+// m: distances of the three points that a circle is drawn through, in turn [probed: x 0.8 no
+// figure; x 1.25 -1 false]
 inline constexpr std::array<float, 4> kScales = {0.08F, 0.2F, 0.45F, 0.9F};
 // Draws of a group at least [bound: time]
 inline constexpr std::size_t kFewestDraws = 24;
@@ -424,9 +435,10 @@ inline constexpr std::size_t kFewestDraws = 24;
 inline constexpr std::size_t kPointsPerDraw = 8;
 // Draws of a group at most [bound: time]
 inline constexpr std::size_t kMostDraws = 150;
-// m: a circle counts by the power 0.7 of its radius and this [not recorded]
+// m: a circle counts by the power 0.7 of its radius and this [probed: x 0.8 no figure; x 1.25 +1
+// stem, sd +1 %]
 inline constexpr double kLengthOffset = 0.15;
-// Points on a circle that one inside it outweighs [not recorded]
+// Points on a circle that one inside it outweighs [probed: no byte]
 inline constexpr double kInsideWeight = 1.5;
 }  // namespace circle_search
 
