@@ -10,7 +10,7 @@
 //   chosen   by judgement, fitted to nothing
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
-//   not recorded   in use for long, and nothing tells why it is this number
+//   probed   what a fifth less and a quarter more change, docs/method/constants.md
 // or real clouds and measurements by their page.
 namespace understory::map_constants {
 
@@ -81,7 +81,7 @@ inline constexpr double kFew = 0.1;
 // Share of the views in whose sector a listed tree lies that have to show it
 // [docs/method/sparse.md: an eighth]
 inline constexpr double kListedPresence = 0.12;
-// m: listed trees that are nearer and never seen together are one [not recorded]
+// m: listed trees that are nearer and never seen together are one [probed: no byte]
 inline constexpr double kListedDuplicate = 1.2;
 }  // namespace stem_map
 

@@ -9,6 +9,7 @@
 //   chosen   by judgement, fitted to nothing
 //   bound    by physics, geometry, statistics, memory or time
 //   tuned    on the recordings named; where none are, on simulated ones with seeds up to 19
+//   probed   what a fifth less and a quarter more change, docs/method/constants.md
 //   not recorded   in use for long, and nothing tells why it is this number
 // or real clouds and measurements by their page.
 namespace understory::preprocess_constants {
@@ -38,15 +39,15 @@ inline constexpr double kSteep = 0.25;
 }  // namespace carried_returns
 
 namespace event_orderer {  // preprocess/streams/event_orderer.cc
-// Messages of a stream while no other has any: it cannot be compared then [not recorded]
+// Messages of a stream while no other has any: it cannot be compared then [probed: no byte]
 inline constexpr std::size_t kMostSuspects = 1000;
-// Scans of the lidar while no other stream has a message: the same [not recorded]
+// Scans of the lidar while no other stream has a message: the same [probed: no byte]
 inline constexpr std::size_t kMostSuspectScans = 32;
-// Smallest jumps: a longer step tells nothing of the rate of a stream [not recorded]
+// Smallest jumps: a longer step tells nothing of the rate of a stream [probed: no byte]
 inline constexpr std::int64_t kStartFactor = 5;
 // Messages that wait for a verdict on their clock at most [bound: memory]
 inline constexpr std::size_t kMostHeld = 20'000;
-// Scans after which an IMU without a message is silent [not recorded]
+// Scans after which an IMU without a message is silent [probed: no byte]
 inline constexpr std::uint32_t kSilentScans = 10;
 }  // namespace event_orderer
 
