@@ -83,6 +83,14 @@ inline constexpr double kFew = 0.1;
 inline constexpr double kListedPresence = 0.12;
 // m: listed trees that are nearer and never seen together are one [probed: no byte]
 inline constexpr double kListedDuplicate = 1.2;
+// Standard deviation of a diameter. Sights that what sights state of themselves counts as, beside
+// their scatter ... [tuned: benchmarks/stated_errors.py, on
+// recordings of docs/method/sparse-experiments.md, how sure diameters are]
+inline constexpr double kStatedSights = 4.0;
+// ... of the diameter, as a stem is not round ... [tuned likewise]
+inline constexpr double kOval = 0.015;
+// ... and of what wide beams add to the width of a stem [tuned likewise]
+inline constexpr double kBeamShare = 0.85;
 }  // namespace stem_map
 
 namespace loop_closer {  // map/loop_closer.cc

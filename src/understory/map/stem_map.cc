@@ -18,12 +18,21 @@ namespace {
 
 using namespace map_constants::stem_map;
 
+// One stem of a view, in the world.
+struct StemSight {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
+  double dbh_m = 0.0;
+  double dbh_own_m2 = 0.0;  // variance of the diameter, as the detector states it
+  double range_m = 0.0;     // from the body, in the plane
+  int view = 0;
+};
+
 // A tree while it is gathered (Welford's running moments).
 struct Gathered {
   MappedStem stem;
   Eigen::Vector2d squares = Eigen::Vector2d::Zero();
   Eigen::Vector3d axes = Eigen::Vector3d::Zero();
-  double dbh_squares = 0.0;
   std::vector<int> views;  // that saw it, ascending
 };
 
@@ -44,7 +53,12 @@ void merge(Gathered& tree, const Gathered& other) {
     const double mean = k > 0.0 ? a.dbh_m : b.dbh_m;
     const double e = b.dbh_m - mean;
     a.dbh_m = mean + e * l / (k + l);
-    tree.dbh_squares += other.dbh_squares + e * e * k * l / (k + l);
+    a.dbh_squares_m2 += b.dbh_squares_m2 + e * e * k * l / (k + l);
+    const auto mean_of_both = [&](double mine, double its) {
+      return k > 0.0 ? mine + (its - mine) * l / (k + l) : its;
+    };
+    a.dbh_own_m2 = mean_of_both(a.dbh_own_m2, b.dbh_own_m2);
+    a.dbh_range_m = mean_of_both(a.dbh_range_m, b.dbh_range_m);
     a.dbh_sights += b.dbh_sights;
   }
   a.sights += b.sights;
@@ -57,43 +71,45 @@ void merge(Gathered& tree, const Gathered& other) {
 }
 
 // One more sight.
-void update(Gathered& tree, const Eigen::Vector3d& point, const Eigen::Vector3d& axis, double dbh_m,
-            int view) {
+void update(Gathered& tree, const StemSight& sight) {
   MappedStem& stem = tree.stem;
   ++stem.sights;
-  stem.last_view = view;
-  if (tree.views.empty() || tree.views.back() != view) tree.views.push_back(view);
-  const Eigen::Vector3d d = point - stem.point_in_world;
+  stem.last_view = sight.view;
+  if (tree.views.empty() || tree.views.back() != sight.view) tree.views.push_back(sight.view);
+  const Eigen::Vector3d d = sight.point - stem.point_in_world;
   stem.point_in_world += d / stem.sights;
-  tree.squares += d.head<2>().cwiseProduct((point - stem.point_in_world).head<2>());
-  if (axis.allFinite()) {
-    tree.axes += axis.z() < 0.0 ? Eigen::Vector3d(-axis) : axis;
+  tree.squares += d.head<2>().cwiseProduct((sight.point - stem.point_in_world).head<2>());
+  if (sight.axis.allFinite()) {
+    tree.axes += sight.axis.z() < 0.0 ? Eigen::Vector3d(-sight.axis) : sight.axis;
     ++stem.axis_sights;
   }
-  if (!std::isfinite(dbh_m)) return;
-  if (stem.dbh_sights == 0) stem.dbh_m = 0.0;
+  if (!std::isfinite(sight.dbh_m)) return;
+  if (stem.dbh_sights == 0) stem.dbh_m = stem.dbh_own_m2 = stem.dbh_range_m = 0.0;
   ++stem.dbh_sights;
-  const double e = dbh_m - stem.dbh_m;
+  const double e = sight.dbh_m - stem.dbh_m;
   stem.dbh_m += e / stem.dbh_sights;
-  tree.dbh_squares += e * (dbh_m - stem.dbh_m);
+  stem.dbh_squares_m2 += e * (sight.dbh_m - stem.dbh_m);
+  stem.dbh_own_m2 += (sight.dbh_own_m2 - stem.dbh_own_m2) / stem.dbh_sights;
+  stem.dbh_range_m += (sight.range_m - stem.dbh_range_m) / stem.dbh_sights;
 }
 
 class Gatherer {
  public:
   explicit Gatherer(double merge_m) : merge_m_(merge_m) {}
 
-  void add(const Eigen::Vector3d& point, const Eigen::Vector3d& axis, double dbh_m, int view) {
-    const int found = nearest(point);
+  void add(const StemSight& sight) {
+    const int found = nearest(sight.point);
     if (found < 0) {
-      cells_[key(point.x(), point.y(), 0, 0)].push_back(static_cast<int>(trees_.size()));
+      cells_[key(sight.point.x(), sight.point.y(), 0, 0)].push_back(
+          static_cast<int>(trees_.size()));
       trees_.emplace_back();
-      trees_.back().stem.first_view = view;
-      update(trees_.back(), point, axis, dbh_m, view);
+      trees_.back().stem.first_view = sight.view;
+      update(trees_.back(), sight);
       return;
     }
     Gathered& tree = trees_[static_cast<std::size_t>(found)];
     const Eigen::Vector3d before = tree.stem.point_in_world;
-    update(tree, point, axis, dbh_m, view);
+    update(tree, sight);
     move(found, before, tree.stem.point_in_world);
   }
 
@@ -142,16 +158,18 @@ class Gatherer {
   std::unordered_map<std::uint64_t, std::vector<int>> cells_;
 };
 
-// visit(point, axis, dbh_m, view) of every sight, in the world, in the order of the views.
+// visit(sight) of every stem, in the order of the views.
 template <typename Visit>
 void for_each_sight(const std::vector<StemView>& views, const std::vector<Pose>& world_from_body,
                     const Visit& visit) {
   for (std::size_t i = 0; i < views.size(); ++i) {
     const Eigen::Matrix3d rotation = world_from_body[i].rotation_matrix();
     for (const Stem& stem : views[i].stems) {
-      visit(rotation * stem.point.cast<double>() + world_from_body[i].translation(),
-            rotation * stem.axis.cast<double>(), static_cast<double>(stem.dbh_m),
-            static_cast<int>(i));
+      const Eigen::Vector3d from_body = rotation * stem.point.cast<double>();
+      const double dbh_own_m = 2.0 * static_cast<double>(stem.radius_sd_m);
+      visit(StemSight{from_body + world_from_body[i].translation(),
+                      rotation * stem.axis.cast<double>(), static_cast<double>(stem.dbh_m),
+                      dbh_own_m * dbh_own_m, from_body.head<2>().norm(), static_cast<int>(i)});
     }
   }
 }
@@ -159,9 +177,7 @@ void for_each_sight(const std::vector<StemView>& views, const std::vector<Pose>&
 std::vector<Gathered> gathered(const std::vector<StemView>& views,
                                const std::vector<Pose>& world_from_body, double merge_m) {
   Gatherer gatherer(merge_m);
-  for_each_sight(views, world_from_body,
-                 [&](const Eigen::Vector3d& point, const Eigen::Vector3d& axis, double dbh_m,
-                     int view) { gatherer.add(point, axis, dbh_m, view); });
+  for_each_sight(views, world_from_body, [&](const StemSight& sight) { gatherer.add(sight); });
   return std::move(gatherer).trees();
 }
 
@@ -170,22 +186,18 @@ std::vector<Gathered> gathered_by_shape(const std::vector<StemView>& views,
                                         const std::vector<Pose>& world_from_body, double radius_m) {
   std::vector<Eigen::Vector2d> places;
   for_each_sight(views, world_from_body,
-                 [&](const Eigen::Vector3d& point, const Eigen::Vector3d&, double, int) {
-                   places.emplace_back(point.head<2>());
-                 });
+                 [&](const StemSight& sight) { places.emplace_back(sight.point.head<2>()); });
   const std::vector<int> cluster_of = alpha_clusters(places, radius_m);
   std::vector<Gathered> trees;
-  std::size_t sight = 0;
-  for_each_sight(
-      views, world_from_body,
-      [&](const Eigen::Vector3d& point, const Eigen::Vector3d& axis, double dbh_m, int view) {
-        const int cluster = cluster_of[sight++];
-        if (cluster < 0) return;
-        const auto c = static_cast<std::size_t>(cluster);
-        if (c >= trees.size()) trees.resize(c + 1);
-        if (trees[c].stem.sights == 0) trees[c].stem.first_view = view;
-        update(trees[c], point, axis, dbh_m, view);
-      });
+  std::size_t number = 0;
+  for_each_sight(views, world_from_body, [&](const StemSight& sight) {
+    const int cluster = cluster_of[number++];
+    if (cluster < 0) return;
+    const auto c = static_cast<std::size_t>(cluster);
+    if (c >= trees.size()) trees.resize(c + 1);
+    if (trees[c].stem.sights == 0) trees[c].stem.first_view = sight.view;
+    update(trees[c], sight);
+  });
   return trees;
 }
 
@@ -271,8 +283,6 @@ MappedStem finished(const Gathered& tree) {
     stem.axis_noise_rad =
         std::sqrt(2.0 * std::max(0.0, shortness) * stem.axis_sights / (stem.axis_sights - 1));
   }
-  if (stem.dbh_sights > 1)
-    stem.dbh_sd_m = std::sqrt(tree.dbh_squares / (stem.dbh_sights - 1) / stem.dbh_sights);
   return stem;
 }
 
@@ -317,6 +327,17 @@ std::vector<MappedStem> build_stem_map(const std::vector<StemView>& views,
     result.push_back(stem);
   }
   return result;
+}
+
+double dbh_sd_m(const MappedStem& stem, double excess_m) {
+  if (stem.dbh_sights == 0) return std::numeric_limits<double>::quiet_NaN();
+  const bool own = std::isfinite(stem.dbh_own_m2);
+  const double stated = own ? kStatedSights : 0.0;
+  // 0 / 0 where one sight is all there is.
+  const double of_sight = (stem.dbh_squares_m2 + (own ? stated * stem.dbh_own_m2 : 0.0)) /
+                          (stem.dbh_sights - 1 + stated);
+  return std::hypot(std::sqrt(of_sight / stem.dbh_sights), kOval * stem.dbh_m,
+                    kBeamShare * excess_m);
 }
 
 }  // namespace understory

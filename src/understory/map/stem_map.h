@@ -14,10 +14,13 @@ namespace understory {
 struct MappedStem {
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
   Eigen::Vector3d axis_in_world = Eigen::Vector3d::UnitZ();
-  Eigen::Vector2d variance_m2 = Eigen::Vector2d::Zero();  // of one sight, x and y
-  double dbh_m = std::numeric_limits<double>::quiet_NaN();
-  double dbh_sd_m = std::numeric_limits<double>::quiet_NaN();  // of the mean; needs two sights
+  Eigen::Vector2d variance_m2 = Eigen::Vector2d::Zero();    // of one sight, x and y
+  double dbh_m = std::numeric_limits<double>::quiet_NaN();  // mean of the sights that tell one
   int dbh_sights = 0;
+  double dbh_squares_m2 = 0.0;  // sum of the squares of their differences from the mean
+  // Mean of the variances that they state themselves; NaN where one states none.
+  double dbh_own_m2 = std::numeric_limits<double>::quiet_NaN();
+  double dbh_range_m = std::numeric_limits<double>::quiet_NaN();  // mean distance, in the plane
   int sights = 0;
   // Root mean square angle between the axes of its sights and their mean; needs two with an axis.
   double axis_noise_rad = std::numeric_limits<double>::quiet_NaN();
@@ -52,5 +55,12 @@ void describe(ConfigTable& table, StemMapConfig& config);
 [[nodiscard]] std::vector<MappedStem> build_stem_map(const std::vector<StemView>& views,
                                                      const std::vector<Pose>& world_from_body,
                                                      const StemMapConfig& config);
+
+// Standard deviation of a tree's diameter, metres. It holds the scatter of the sights, and two
+// errors that all of them share. A stem is not round, and its sights look from like directions. And
+// wide beams make it look thicker by about `excess_m` (excess_width_m; 0: beams without width). How
+// far single sights scatter is told by their scatter and by what they state themselves. NaN without
+// a diameter, or where one sight states nothing.
+[[nodiscard]] double dbh_sd_m(const MappedStem& stem, double excess_m);
 
 }  // namespace understory

@@ -148,5 +148,77 @@ TEST(StemMap, WhatIsSeenNowAndThenIsNoTree) {
   EXPECT_NEAR(list[0].presence, 1.0, 1e-9);
 }
 
+// A view of stems whose diameters are given, each at its place and from the origin.
+StemView view_of_diameters(int frame, const std::vector<double>& dbh_m) {
+  StemView view;
+  view.frame = frame;
+  for (std::size_t i = 0; i < dbh_m.size(); ++i) {
+    Stem stem;
+    stem.point = Eigen::Vector3f(3.0F * static_cast<float>(i % 20 + 1),
+                                 3.0F * static_cast<float>(i / 20 + 1), 0.0F);
+    stem.dbh_m = static_cast<float>(dbh_m[i]);
+    stem.radius_sd_m = 0.005F;
+    view.stems.push_back(stem);
+  }
+  return view;
+}
+
+// The standard deviation was once that of a mean of independent sights, from their scatter alone.
+// Half of the errors were within it at lieksa1 to lieksa3. All sights share that a stem is not
+// round, and few sights agree by chance.
+TEST(StemMap, TheDeviationOfADiameterHoldsWhatAllSightsShare) {
+  constexpr double kTrue = 0.2;
+  constexpr std::size_t kTrees = 400;
+  for (const int sights : {3, 6, 30}) {
+    std::mt19937 random(7);
+    std::normal_distribution<double> normal;
+    std::vector<double> seen(kTrees);
+    for (double& dbh : seen)
+      dbh = kTrue * (1.0 + 0.015 * normal(random));
+    std::vector<StemView> views;
+    for (int i = 0; i < sights; ++i) {
+      std::vector<double> noisy = seen;
+      for (double& dbh : noisy)
+        dbh += 0.01 * normal(random);
+      views.push_back(view_of_diameters(i, noisy));
+    }
+    const auto map = build_stem_map(views, std::vector<Pose>(views.size()), {});
+    ASSERT_EQ(map.size(), kTrees);
+    double once = 0.0;
+    double twice = 0.0;
+    for (const MappedStem& stem : map) {
+      const double error = std::abs(stem.dbh_m - kTrue);
+      once += error <= dbh_sd_m(stem, 0.0) ? 1.0 / kTrees : 0.0;
+      twice += error <= 2.0 * dbh_sd_m(stem, 0.0) ? 1.0 / kTrees : 0.0;
+    }
+    EXPECT_NEAR(once, 0.683, 0.06) << sights;
+    EXPECT_NEAR(twice, 0.954, 0.03) << sights;
+  }
+}
+
+// What beams add is the same in all sights: it does not become smaller in their mean.
+TEST(StemMap, WideBeamsMakeADiameterLessSure) {
+  std::vector<StemView> views;
+  for (int i = 0; i < 100; ++i)
+    views.push_back(view_of_diameters(i, {0.2}));
+  const auto map = build_stem_map(views, std::vector<Pose>(views.size()), {});
+  ASSERT_EQ(map.size(), 1U);
+  EXPECT_NEAR(map[0].dbh_range_m, std::hypot(3.0, 3.0), 1e-6);
+  EXPECT_LT(dbh_sd_m(map[0], 0.0), 0.0035);
+  EXPECT_GT(dbh_sd_m(map[0], 0.02), 0.015);
+}
+
+TEST(StemMap, ALoneSightIsAsSureAsItStates) {
+  StemMapConfig config;
+  config.min_sights = 1;
+  StemView view = view_of_diameters(0, {0.2});
+  const auto sd = [&] { return dbh_sd_m(build_stem_map({view}, {Pose()}, config).at(0), 0.0); };
+  EXPECT_NEAR(sd(), std::hypot(0.01, 0.003), 1e-6);
+  view.stems[0].radius_sd_m = Stem::kUnknown;
+  EXPECT_TRUE(std::isnan(sd()));
+  view.stems[0].dbh_m = Stem::kUnknown;
+  EXPECT_TRUE(std::isnan(sd()));
+}
+
 }  // namespace
 }  // namespace understory

@@ -11,6 +11,11 @@ namespace {
 
 using namespace beam_constants;
 
+constexpr std::string_view kSingleRays = ", single rays";
+
+// Three of the four lidars that are known have beams of 3 mrad.
+constexpr LidarSensor kUsualSensor = LidarSensor::kVlp16;
+
 // The beams of a sensor by its data sheet, as in simulated recordings.
 BeamConfig beams_of(LidarSensor sensor) {
   switch (sensor) {
@@ -88,6 +93,12 @@ LidarSensor sensor_of_model(std::string_view lidar_model) {
   if (lidar_model == "VLP-16") return LidarSensor::kVlp16;
   if (lidar_model == "VLP-32C") return LidarSensor::kVlp32;
   return LidarSensor::kUnknown;
+}
+
+BeamConfig usual_beams(std::string_view lidar_model) {
+  if (lidar_model.ends_with(kSingleRays)) return {LidarSensor::kUnknown, 0.0, 0.0, 0.0};
+  const LidarSensor sensor = sensor_of_model(lidar_model);
+  return beams_of(sensor == LidarSensor::kUnknown ? kUsualSensor : sensor);
 }
 
 BeamFootprint footprint_at(const BeamConfig& config, double range_m) {

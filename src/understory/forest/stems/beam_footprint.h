@@ -26,6 +26,10 @@ void describe(ConfigTable& table, BeamConfig& config);
 // any other name.
 [[nodiscard]] LidarSensor sensor_of_model(std::string_view lidar_model);
 
+// The beams of that lidar. Of one that is not known they are as wide as those of most lidars. Those
+// of simulated recordings with one ray a beam have no width, and their name says so.
+[[nodiscard]] BeamConfig usual_beams(std::string_view lidar_model);
+
 // The beams that met a stem.
 struct BeamFootprint {
   double sd_m = 0.0;     // a quarter of their width there; 0: nothing is known of them

@@ -145,5 +145,12 @@ TEST(BeamFootprint, DiametersAreLessSureWhereEchoesAreWeak) {
               std::pow(0.0074 / 3.0, 2) - std::pow(0.0074 / 50.0, 2), 1e-9);
 }
 
+TEST(BeamFootprint, BeamsOfAnUnknownLidarAreAsWideAsUsual) {
+  EXPECT_EQ(footprint_at(usual_beams("OS-0-128"), 10.0).sd_m,
+            footprint_at({LidarSensor::kOs0}, 10.0).sd_m);
+  EXPECT_GT(footprint_at(usual_beams(""), 10.0).sd_m, 0.01);
+  EXPECT_EQ(footprint_at(usual_beams("VLP-16, single rays"), 10.0).sd_m, 0.0);
+}
+
 }  // namespace
 }  // namespace understory

@@ -11,6 +11,7 @@
 #include "understory/pipeline/judgement/inherited_trust.h"
 #include "understory/pipeline/run_folder/run_documents.h"
 #include "understory/pipeline/run_folder/run_folder.h"
+#include "understory/pipeline/run_folder/run_json.h"
 #include "understory/recording/clouds/stems_file.h"
 #include "understory/util/error.h"
 #include "understory/util/files/output_guard.h"
@@ -80,8 +81,10 @@ CorrectionInput read_stems(const CorrectionRequest& request, Log& log, StageTime
   documents.add_input(stems);
   documents.inherit(trust_of_run(request.stems));
   // Beside a path in north, east, down its correction has the same axes.
-  if (std::filesystem::is_directory(request.stems))
+  if (std::filesystem::is_directory(request.stems)) {
     documents.tell_world_in(world_frame_of_run(request.stems));
+    input.lidar_model = RunJson(request.stems).find_text("/lidar_model");
+  }
   documents.report().title = request.stems.filename().string();
   const std::string& head_log = request.config.harvester.head_log;
   input.head_cuts = read_head_log(head_log);

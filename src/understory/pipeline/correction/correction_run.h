@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "understory/evaluation/trajectory.h"
@@ -27,7 +28,8 @@ struct CorrectionInput {
   std::vector<float> scan_ms;  // work on the scan of each view; 0: unknown
   bool stopped = false;        // before all views had their steps: they are not corrected
   std::vector<LoggedCut> head_cuts;
-  std::vector<GnssFix> fixes;                      // of the recording; compared with, not used
+  std::string lidar_model;     // of the recording; empty where it is unknown or there are several
+  std::vector<GnssFix> fixes;  // of the recording; compared with, not used
   std::optional<Eigen::Vector3d> antenna_in_body;  // metres; nothing where unknown
   std::optional<Eigen::Vector3d> second_antenna_in_body;
   std::optional<Trajectory> truth;  // of a simulated recording

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "understory/forest/stems/beam_footprint.h"
 #include "understory/forest/trees/tree_doubt.h"
 #include "understory/output/layers/layer_files.h"
 #include "understory/output/run_tables.h"
@@ -17,7 +18,12 @@
 namespace understory {
 namespace {
 
-std::vector<Tree> trees_of(const std::vector<MappedStem>& stems) {
+// By how much wide beams make a stem look too thick, metres.
+double excess_of(const MappedStem& stem, const BeamConfig& beams) {
+  return 2.0 * excess_width_m(footprint_at(beams, stem.dbh_range_m), 0.5 * stem.dbh_m);
+}
+
+std::vector<Tree> trees_of(const std::vector<MappedStem>& stems, const BeamConfig& beams) {
   std::vector<Tree> trees;
   for (const MappedStem& stem : stems) {
     Tree tree;
@@ -26,7 +32,7 @@ std::vector<Tree> trees_of(const std::vector<MappedStem>& stems) {
     tree.y = stem.point_in_world.y();
     tree.z = stem.point_in_world.z();
     tree.dbh_m = stem.dbh_m;
-    tree.dbh_sd_m = stem.dbh_sd_m;
+    tree.dbh_sd_m = dbh_sd_m(stem, excess_of(stem, beams));
     tree.lean_deg = std::acos(std::clamp(stem.axis_in_world.z(), -1.0, 1.0)) * 180.0 / M_PI;
     tree.observations = stem.sights;
     tree.x_sd_m = std::sqrt(stem.variance_m2.x() / stem.sights);
@@ -46,6 +52,7 @@ StemMapMaker::StemMapMaker(CorrectionInput input, RunDocuments documents,
       config_(config),
       place_(place) {
   UNDERSTORY_CHECK(run_.steps.size() == run_.views.size());
+  documents_.summary().lidar_model = run_.lidar_model;
 }
 
 void StemMapMaker::close_loops() {
@@ -71,7 +78,7 @@ void StemMapMaker::finish_map() {
 }
 
 void StemMapMaker::list_trees() {
-  run_.trees = trees_of(run_.stems);
+  run_.trees = trees_of(run_.stems, usual_beams(run_.lidar_model));
 }
 
 PlacedMap StemMapMaker::place_on_globe(const Trajectory& trajectory) {

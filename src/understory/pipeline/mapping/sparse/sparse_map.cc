@@ -5,6 +5,7 @@
 
 #include "understory/output/run_tables.h"
 #include "understory/pipeline/correction/stem_map_maker.h"
+#include "understory/pipeline/inventory/lidar_view.h"
 #include "understory/pipeline/judgement/input_remarks.h"
 #include "understory/pipeline/mapping/map_documents.h"
 #include "understory/pipeline/mapping/sparse/sparse_evidence.h"
@@ -62,6 +63,7 @@ CorrectionInput correction_input(SparseFrontEnd& front_end, const ReadRecording&
   if (const auto& antenna = source.rig().body_from_gnss)
     input.antenna_in_body = antenna->translation();
   input.second_antenna_in_body = second_antenna_of(source.rig());
+  input.lidar_model = single_lidar_model(source.rig());
   input.head_cuts = read_head_log(front_end.config().correction.harvester.head_log);
   front_end.hand_over(input.views, input.steps, input.path, input.fixes);
   write_stems(recording.results / "stems.csv.gz", input.views);
