@@ -102,7 +102,7 @@ void add_stem_forms(InventoryResult& result) {
     Tree& tree = result.trees[i];
     const StemCurve& curve = result.curves[i];
     tree.stem_volume_m3 = curve.volume_m3;
-    tree.stem_volume_sd_m3 = curve.volume_sd_m3;
+    tree.stem_volume_sd_m3 = volume_sd_m3(curve, tree.dbh_sd_m / tree.dbh_m, tree.height_sd_m);
     tree.sweep_m = curve.sweep_m;
     if (curve.fork) tree.fork_m = curve.fork->height_m;
   }

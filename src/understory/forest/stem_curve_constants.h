@@ -200,10 +200,6 @@ inline constexpr double kLeastSpread = 0.004;
 inline constexpr double kOutlierSpreads = 3.0;
 // m of height over which sections are averaged: one standard deviation [chosen]
 inline constexpr double kSmoothing = 0.35;
-// Diameters per metre beyond what was seen: error of the form ... [chosen]
-inline constexpr double kModelSdPerMetre = 0.03;
-// ... and at most [chosen]
-inline constexpr double kMostModelSd = 0.25;
 // Heights of the last section: where the outline of a tree of unknown height ends [chosen]
 inline constexpr double kUnknownTop = 2.0;
 // m: lower trees have no stem curve [bound: breast height]

@@ -27,6 +27,7 @@ struct FittedSection {
   double radius_m = 0.0;
   double sd_m = 0.0;
   double seen_deg = 360.0;  // how far around it was seen
+  bool breast = false;      // the stem at breast height, which all others are tied to
 };
 
 // Follows the stem from one section to the next.
@@ -195,41 +196,62 @@ std::vector<FittedSection> without_outliers(const std::vector<FittedSection>& ri
   return kept;
 }
 
+// A section of the curve with what its error consists of, metres of the diameter.
+struct SmoothSection {
+  CurveSection section;
+  double from_m = 0.0;     // height of the measured part that it follows
+  double own_sd_m = 0.0;   // of the sections that were fitted, beside that of breast height
+  double form_sd_m = 0.0;  // of the form, away from them
+};
+
 // The smooth curve through the sections: at each height the mean of their ratios to the form, near
 // ones with more weight. Beyond the last section the ratio goes on unchanged.
 class SmoothCurve {
  public:
-  SmoothCurve(const std::vector<FittedSection>& rings, const Form& form, const StemFit& stem)
-      : rings_(rings), form_(form), stem_(stem) {}
+  SmoothCurve(const std::vector<FittedSection>& rings, const Form& form, const StemFit& stem,
+              double top_m)
+      : rings_(rings), form_(form), stem_(stem), top_m_(top_m) {}
 
-  [[nodiscard]] CurveSection at(double height_m) const {
-    CurveSection section;
+  [[nodiscard]] SmoothSection at(double height_m) const {
+    SmoothSection smooth;
+    CurveSection& section = smooth.section;
     section.height_m = height_m;
     double weights = 0.0;
     double sum = 0.0;
+    double squared_weights = 0.0;
     double squares = 0.0;
+    double own_squares = 0.0;
     Eigen::Vector2d centre = Eigen::Vector2d::Zero();
     double nearest = std::numeric_limits<double>::infinity();
-    const double inside = std::clamp(height_m, rings_.front().height_m, rings_.back().height_m);
+    double nearest_m = height_m;
+    smooth.from_m = std::clamp(height_m, rings_.front().height_m, rings_.back().height_m);
     for (const FittedSection& ring : rings_) {
-      const double away = std::abs(ring.height_m - inside);
-      nearest = std::min(nearest, std::abs(ring.height_m - height_m));
+      const double away = std::abs(ring.height_m - smooth.from_m);
+      if (std::abs(ring.height_m - height_m) < nearest) {
+        nearest = std::abs(ring.height_m - height_m);
+        nearest_m = ring.height_m;
+      }
       const double weight =
           std::exp(-0.5 * std::pow(away / kSmoothing, 2)) * weight_of(ring) + 1e-12;
       weights += weight;
       sum += weight * ring.radius_m / std::max(1e-6, form_.radius(ring.height_m));
+      squared_weights += weight * weight;
       squares += weight * weight * ring.sd_m * ring.sd_m;
+      // What the map adds is shared with breast height, and part of its error.
+      if (!ring.breast)
+        own_squares += weight * weight * (ring.sd_m * ring.sd_m - kMapError * kMapError);
       centre += weight * (ring.centre - line_at(ring.height_m));
     }
     section.centre = line_at(height_m) + centre / weights;
     section.diameter_m = 2.0 * sum / weights * form_.radius(height_m);
     section.measured = nearest < kStep;
-    const double away = std::max(0.0, nearest - kStep);
-    // Neighbouring sections share points and errors of the map.
-    const double own = 2.0 * std::sqrt(kCorrelatedRings * squares) / weights;
+    // Neighbouring sections share points and errors of the map. One alone shares with none.
+    const double together = std::min(kCorrelatedRings, weights * weights / squared_weights);
+    smooth.own_sd_m = 2.0 * std::sqrt(together * own_squares) / weights;
+    smooth.form_sd_m = form_error(height_m, nearest_m) * section.diameter_m;
     section.diameter_sd_m =
-        std::hypot(own, std::min(kMostModelSd, kModelSdPerMetre * away) * section.diameter_m);
-    return section;
+        std::hypot(2.0 * std::sqrt(together * squares) / weights, smooth.form_sd_m);
+    return smooth;
   }
 
  private:
@@ -237,9 +259,18 @@ class SmoothCurve {
     return stem_.centre + (height_m - kBreastHeight) * stem_.slope;
   }
 
+  // The diameter follows a power of the distance to the top, and the power is not sure. That tells
+  // on how a stem goes on from where it was measured, as a share of its diameter.
+  [[nodiscard]] double form_error(double height_m, double measured_m) const {
+    const double left = top_m_ - height_m;
+    if (!(left > 0.0)) return 0.0;
+    return kPowerSd * std::abs(std::log(left / (top_m_ - measured_m)));
+  }
+
   const std::vector<FittedSection>& rings_;
   const Form& form_;
   const StemFit& stem_;
+  double top_m_;
 };
 
 // The largest distance of the centre line from a straight one.
@@ -258,21 +289,34 @@ double sweep_of(const StemCurve& curve) {
   return most;
 }
 
-void add_volume(StemCurve& curve) {
+void add_volume(const std::vector<SmoothSection>& smooth, StemCurve& curve) {
   double volume = 0.0;
-  double sd = 0.0;
-  for (std::size_t i = 1; i < curve.sections.size(); ++i) {
-    const CurveSection& a = curve.sections[i - 1];
-    const CurveSection& b = curve.sections[i];
+  double above = 0.0;     // of it, beyond the last section that was measured
+  double form = 0.0;      // errors of the volume: the form's are the same error at all heights ...
+  double variance = 0.0;  // ... and sections share theirs with those near them
+  double below = 0.0;     // errors of sections farther down, as far as they are shared
+  for (std::size_t i = 1; i < smooth.size(); ++i) {
+    const CurveSection& a = smooth[i - 1].section;
+    const CurveSection& b = smooth[i].section;
     const double length = b.height_m - a.height_m;
     // A cone between two sections.
-    volume +=
+    const double part =
         M_PI / 12.0 * length *
         (a.diameter_m * a.diameter_m + a.diameter_m * b.diameter_m + b.diameter_m * b.diameter_m);
-    sd += M_PI / 4.0 * length * (a.diameter_m * a.diameter_sd_m + b.diameter_m * b.diameter_sd_m);
+    volume += part;
+    if (a.height_m >= curve.measured_to_m) above += part;
+    const double per_diameter = M_PI / 4.0 * length * (a.diameter_m + b.diameter_m);
+    form += 0.5 * per_diameter * (smooth[i - 1].form_sd_m + smooth[i].form_sd_m);
+    const double own = 0.5 * per_diameter * (smooth[i - 1].own_sd_m + smooth[i].own_sd_m);
+    const double apart = smooth[i].from_m - smooth[i - 1].from_m;
+    below *= std::exp(-apart / (kCorrelatedRings * kStep));
+    variance += own * own + 2.0 * own * below;
+    below += own;
   }
   curve.volume_m3 = volume;
-  curve.volume_sd_m3 = sd;
+  curve.volume_form_sd_m3 = std::sqrt(variance + form * form);
+  const double unseen = curve.sections.back().height_m - curve.measured_to_m;
+  curve.volume_per_height_m2 = unseen > 0.0 ? above / unseen : 0.0;
 }
 
 // What the sections around breast height are thicker than the stem there. Its radius rests on many
@@ -317,7 +361,7 @@ std::vector<FittedSection> sections_of(const std::vector<SlicePoint>& points, co
       ring.radius_m -= offset;
   }
   rings.push_back({kBreastHeight, stem.centre, stem.radius_m,
-                   std::sqrt(std::max(0.0, stem.covariance(2, 2))) + kMapError});
+                   std::sqrt(std::max(0.0, stem.covariance(2, 2))) + kMapError, 360.0, true});
   rings.insert(rings.end(), above.begin(), above.end());
   return rings;
 }
@@ -340,17 +384,28 @@ StemCurve measure_stem_curve(std::vector<SlicePoint> points, const StemFit& stem
   rings = without_outliers(rings, form);
   form = form_of(rings, outline, config.species);
   curve.measured_to_m = rings.back().height_m;
-  const SmoothCurve smooth(rings, form, stem);
+  const SmoothCurve smooth(rings, form, stem, outline);
   const double end = std::isfinite(height_m) ? height_m : curve.measured_to_m;
   const auto count = static_cast<int>(std::floor(end / kSectionStep));
+  std::vector<SmoothSection> sections;
   for (int i = 0; i <= count; ++i)
-    curve.sections.push_back(smooth.at(i * kSectionStep));
+    sections.push_back(smooth.at(i * kSectionStep));
+  for (const SmoothSection& section : sections)
+    curve.sections.push_back(section.section);
   curve.sweep_m = sweep_of(curve);
   curve.fork = find_fork(points, curve);
   if (!std::isfinite(height_m)) return curve;
-  if (end > count * kSectionStep + kSameHeight) curve.sections.push_back(smooth.at(end));
-  add_volume(curve);
+  if (end > count * kSectionStep + kSameHeight) {
+    sections.push_back(smooth.at(end));
+    curve.sections.push_back(sections.back().section);
+  }
+  add_volume(sections, curve);
   return curve;
+}
+
+double volume_sd_m3(const StemCurve& curve, double dbh_sd_share, double height_sd_m) {
+  return std::hypot(curve.volume_form_sd_m3, 2.0 * dbh_sd_share * curve.volume_m3,
+                    curve.volume_per_height_m2 * height_sd_m);
 }
 
 }  // namespace understory

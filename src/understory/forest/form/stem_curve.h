@@ -34,7 +34,10 @@ struct StemCurve {
                                        // measured ones end
   double measured_to_m = kUnknown;     // height of the last measured section
   double volume_m3 = kUnknown;         // over bark, ground to top; unknown without a height
-  double volume_sd_m3 = kUnknown;
+  // Standard deviation of the volume where breast height and height of the tree are right: of the
+  // sections and of the form.
+  double volume_form_sd_m3 = kUnknown;
+  double volume_per_height_m2 = kUnknown;  // what a metre of height would add
   // How far the centre line is from a straight one at most, between 0.5 and 5 m above the ground.
   // Unknown where it was not seen up to there.
   double sweep_m = kUnknown;
@@ -53,5 +56,10 @@ struct StemCurveConfig {
 // unknown. The diameter at breast height is that of `stem`. Deterministic.
 [[nodiscard]] StemCurve measure_stem_curve(std::vector<SlicePoint> points, const StemFit& stem,
                                            double height_m, const StemCurveConfig& config);
+
+// Standard deviation of the volume, m3. All diameters of a stem go with that at breast height,
+// whose standard deviation is `dbh_sd_share` of it. What was not measured stretches with the height
+// of the tree, whose standard deviation is `height_sd_m`. NaN without a volume.
+[[nodiscard]] double volume_sd_m3(const StemCurve& curve, double dbh_sd_share, double height_sd_m);
 
 }  // namespace understory
