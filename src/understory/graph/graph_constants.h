@@ -133,6 +133,12 @@ inline constexpr std::size_t kSamples = 256;
 inline constexpr double kRangeShare = 0.9;
 // Share of the stems within its sector: false ones may lie anywhere [chosen]
 inline constexpr double kAngleShare = 0.98;
+// Directions of stems from which on the middle of the sector is looked for [chosen: two of a
+// hundred may lie anywhere]
+inline constexpr std::size_t kFewestDirections = 100;
+// rad: a sector narrower by so much about another direction than the x axis is the one [chosen: a
+// sector about x misses by a few degrees, one of a lidar mounted otherwise by 30 and more]
+inline constexpr double kClearlyNarrowerRad = 15.0 * std::numbers::pi / 180.0;
 }  // namespace view_cone
 
 namespace pair_matching {  // graph/stem_matching/pair_matching.cc

@@ -8,7 +8,7 @@
 #include "understory/geometry/plane/plane_grid.h"
 #include "understory/graph/loops/view_cone.h"
 #include "understory/map/map_constants.h"
-#include "understory/util/error.h"
+#include "understory/map/upright_views.h"
 
 namespace understory {
 namespace {
@@ -22,15 +22,8 @@ struct Sight {
   bool tells;  // near, in the sector and nothing before it
 };
 
-SparsePoints points_of(const StemView& view) {
-  SparsePoints points;
-  for (const Stem& stem : view.stems)
-    points.push_back(stem.point.cast<double>());
-  return points;
-}
-
 // Whether a stem of the view stands before the place, near the line of sight. Level enough: seen
-// from above in the body frame.
+// from above in the frame of an upright view.
 bool hidden(const SparsePoints& stems, const Eigen::Vector3d& place, double clearance_m) {
   const Eigen::Vector2d line = place.head<2>();
   const double distance = line.norm();
@@ -107,10 +100,7 @@ std::vector<FelledTree> felled_trees(const std::vector<StemView>& views,
                                      const std::vector<Pose>& world_from_body,
                                      const std::vector<MappedStem>& trees,
                                      const FelledConfig& config) {
-  UNDERSTORY_CHECK(views.size() == world_from_body.size());
-  std::vector<SparsePoints> points;
-  for (const StemView& view : views)
-    points.push_back(points_of(view));
+  const auto [points, world_from_view] = upright_views(views, world_from_body);
   SparsePoints places;
   for (const MappedStem& tree : trees)
     places.push_back(tree.point_in_world);
@@ -120,12 +110,12 @@ std::vector<FelledTree> felled_trees(const std::vector<StemView>& views,
   for (std::size_t v = 0; v < views.size(); ++v) {
     std::vector<char> seen(trees.size(), 0);
     for (const Eigen::Vector3d& point : points[v]) {
-      const auto found = grid.nearest(world_from_body[v] * point, kSameTreeM, 0.0);
+      const auto found = grid.nearest(world_from_view[v] * point, kSameTreeM, 0.0);
       if (found.index >= 0) seen[static_cast<std::size_t>(found.index)] = 1;
     }
-    const Pose body_from_world = world_from_body[v].inverse();
+    const Pose view_from_world = world_from_view[v].inverse();
     for (std::size_t t = 0; t < trees.size(); ++t) {
-      const Eigen::Vector3d place = body_from_world * places[t];
+      const Eigen::Vector3d place = view_from_world * places[t];
       const double distance = place.head<2>().norm();
       const bool tells = distance > config.nearest_m && distance < config.reach_m &&
                          sector.holds(place) && !hidden(points[v], place, config.clearance_m);

@@ -78,6 +78,34 @@ TEST(FelledTrees, WhatIsHiddenOrOutOfReachIsNotFelled) {
   EXPECT_TRUE(felled_trees({}, {}, {}, {}).empty());
 }
 
+// A scanner of 210 degrees drives among trees. Those that it has passed are behind it, and stand.
+// Its mounting is not known: the body is the lidar, which looks backwards, aside, or lies. Trees
+// behind such a body were told to be felled once.
+TEST(FelledTrees, TreesBehindAScannerThatIsMountedAnyhowStand) {
+  const auto trees = stand();
+  for (const auto& [roll, yaw] :
+       {std::pair(0.0, 0.0), {0.0, M_PI}, {0.0, -1.6}, {1.6, 0.0}, {M_PI, 0.5}, {0.6, M_PI}}) {
+    const Pose view_from_body(
+        Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
+            Eigen::Quaterniond(Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX())),
+        {0.0, 0.0, 0.0});
+    const auto in_front = [&](int i, std::size_t t) {
+      const Eigen::Vector3d ahead = trees[t] - Eigen::Vector3d(0.2 * i, 0.0, 0.0);
+      return std::abs(std::atan2(ahead.y(), ahead.x())) < 105.0 * M_PI / 180.0;
+    };
+    WalkPastTrees seen = walk_past(
+        trees, [&](int i, std::size_t t) { return in_front(i, t) && (t != 15 || i < 20); });
+    for (std::size_t i = 0; i < seen.views.size(); ++i) {
+      seen.poses[i] = seen.poses[i] * view_from_body;
+      for (Stem& stem : seen.views[i].stems)
+        stem.point = (view_from_body.inverse() * stem.point.cast<double>()).cast<float>();
+    }
+    const auto felled = felled_trees(seen.views, seen.poses, seen.trees, {});
+    ASSERT_EQ(felled.size(), 1U) << roll << " " << yaw;
+    EXPECT_EQ(felled[0].tree, 15U);
+  }
+}
+
 // Undergrowth hides tree 14 from behind. It stands, and where nobody fells nothing says otherwise;
 // once it is not seen from where it was seen before, it is gone.
 TEST(FelledTrees, WhereNobodyFellsOnlyPlacesThatShowedTheTreeTell) {

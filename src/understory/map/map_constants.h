@@ -49,6 +49,15 @@ inline constexpr double kSameTreeM = 0.6;
 inline constexpr double kSamePlaceM = 3.0;
 }  // namespace felled_trees
 
+namespace upright_views {  // map/upright_views.cc
+// z of up in the body below which it is turned upright: cosine of 20 degrees [chosen: no machine
+// works for long on a slope as steep]
+inline constexpr double kUpright = 0.94;
+// z of up in the body below which the body hangs over: cosine of 120 degrees [chosen: as in
+// odometry/stems/stem_levelling.cc]
+inline constexpr double kFarOver = -0.5;
+}  // namespace upright_views
+
 namespace foot_heights {  // map/foot_heights.cc
 // m in the plane within which feet show the height of the body above the ground [chosen: on a slope
 // feet before and behind a body differ by less than a metre]

@@ -11,6 +11,7 @@
 #include "understory/geometry/plane/plane_grid.h"
 #include "understory/graph/loops/view_cone.h"
 #include "understory/map/map_constants.h"
+#include "understory/map/upright_views.h"
 #include "understory/util/error.h"
 
 namespace understory {
@@ -211,19 +212,15 @@ SparsePoints places_of(const std::vector<Gathered>& trees) {
 // In how many views each tree lies within the sector that the views usually see.
 std::vector<int> chances(const std::vector<Gathered>& trees, const std::vector<StemView>& views,
                          const std::vector<Pose>& world_from_body) {
-  std::vector<SparsePoints> points(views.size());
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    for (const Stem& stem : views[i].stems)
-      points[i].push_back(stem.point.cast<double>());
-  }
-  const ConeOverlap sector(estimate_view_cone(points));
+  const UprightViews upright = upright_views(views, world_from_body);
+  const ConeOverlap sector(estimate_view_cone(upright.points));
   const PlaneGrid grid(places_of(trees));
   std::vector<int> count(trees.size(), 0);
-  for (const Pose& pose : world_from_body) {
-    const Pose body_from_world = pose.inverse();
+  for (const Pose& pose : upright.world_from_view) {
+    const Pose view_from_world = pose.inverse();
     grid.around(pose.translation(), sector.cone().range_m, [&](int t) {
       const auto k = static_cast<std::size_t>(t);
-      if (sector.holds(body_from_world * trees[k].stem.point_in_world)) ++count[k];
+      if (sector.holds(view_from_world * trees[k].stem.point_in_world)) ++count[k];
     });
   }
   return count;

@@ -285,6 +285,12 @@ inline constexpr double kRing = 5.0;
 inline constexpr int kRings = 8;
 }  // namespace correction_figures
 
+namespace head_cut_log {  // pipeline/correction/head_cut_log.cc
+// Cuts of a head from which on most of them must lie at trees [chosen: of fewer, one or two may be
+// of trees that the lidar never listed]
+inline constexpr std::size_t kFewestCuts = 4;
+}  // namespace head_cut_log
+
 namespace imu_calibration {  // pipeline/calibration/lidar_imu_run.cc, lidar_clocks_run.cc
 // Times the covariance where the scans were deskewed without the IMU [tuned: handheld by VLP-16,
 // 60 s, seeds 1, 2, 102, 120: squared errors over the variance were 4.3]

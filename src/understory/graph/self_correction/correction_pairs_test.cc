@@ -59,6 +59,33 @@ TEST(ViewCone, IsEstimatedFromTheViews) {
   EXPECT_EQ(estimate_view_cone({}).range_m, 0.0);
 }
 
+// As IsEstimatedFromTheViews, by a lidar that looks along `yaw` of its frame. The middle was taken
+// to be the x axis once, so a lidar that looks backwards had no sector.
+TEST(ViewCone, ItsMiddleIsWhereTheLidarLooks) {
+  const double half = 105.0 * M_PI / 180.0;
+  for (const double yaw : {0.0, 0.5 * M_PI, M_PI, -2.0}) {
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> unit(0.0, 1.0);
+    std::vector<SparsePoints> views(20);
+    for (int k = 0; k < 2000; ++k) {
+      const double a = yaw + (2.0 * unit(random) - 1.0) * half;
+      const double r = 40.0 * std::sqrt(unit(random));
+      views[static_cast<std::size_t>(k % 20)].emplace_back(r * std::cos(a), r * std::sin(a), 0.0);
+    }
+    const ViewCone cone = estimate_view_cone(views);
+    EXPECT_NEAR(cone.half_angle_rad, half, 0.05) << yaw;
+    EXPECT_NEAR(std::remainder(cone.middle_rad - yaw, 2.0 * M_PI), 0.0, 0.05) << yaw;
+    const ConeOverlap turned(cone);
+    EXPECT_TRUE(turned.holds({20.0 * std::cos(yaw + 1.5), 20.0 * std::sin(yaw + 1.5), 0.0}));
+    EXPECT_FALSE(turned.holds({-20.0 * std::cos(yaw), -20.0 * std::sin(yaw), 0.0})) << yaw;
+    // Two poses of it overlap as those of one that looks along x and is turned instead.
+    const ConeOverlap straight({cone.range_m, cone.half_angle_rad});
+    EXPECT_NEAR(turned(flat(0.0, 0.0, 0.3 - yaw), flat(15.0, 8.0, 1.9 - yaw)),
+                straight(flat(0.0, 0.0, 0.3), flat(15.0, 8.0, 1.9)), 0.03)
+        << yaw;
+  }
+}
+
 TEST(CorrectionPairs, AcceptableIsEquation27) {
   const PairConfig config;
   EXPECT_TRUE(acceptable(0.49, 0.4, config));

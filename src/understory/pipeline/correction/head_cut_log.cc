@@ -7,12 +7,15 @@
 
 #include "understory/evaluation/world_frame.h"
 #include "understory/output/run_tables.h"
+#include "understory/pipeline/pipeline_constants.h"
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
 #include "understory/util/files/csv.h"
 
 namespace understory {
 namespace {
+
+using namespace pipeline_constants::head_cut_log;
 
 TimeNs stamp_of(const FelledStand& stand, int view) {
   return stand.views[static_cast<std::size_t>(view)].stamp;
@@ -36,6 +39,23 @@ void write_cuts(const std::filesystem::path& path, const std::vector<PlacedCut>&
     file.write(cut.tree_id == 0 ? ",\n" : fmt::format("{},{:.3f}\n", cut.tree_id, cut.distance_m));
   }
   file.commit();
+}
+
+// The cuts with the trees that they felled. Where most of many cuts lie at no tree, the places of
+// the head are not those of the frame of the body. What lies near a cut is there by chance then.
+std::vector<CutTree> trees_of_cuts(const FelledStand& stand, const std::vector<HeadCut>& cuts,
+                                   const std::vector<FelledTree>& felled, const CutMatching& config,
+                                   Log& log) {
+  std::vector<CutTree> matched = match_cuts(cuts, stand.stems, felled, stand.views, config);
+  const auto without = static_cast<std::size_t>(std::count_if(
+      matched.begin(), matched.end(), [](const CutTree& cut) { return cut.tree < 0; }));
+  if (matched.size() < kFewestCuts || 2 * without <= matched.size()) return matched;
+  log.warn("felling.head_place",
+           fmt::format("{} of {} cuts of the head lie at no tree, so the log is not used. The log "
+                       "and the path do not share one body frame or one clock: check the "
+                       "extrinsics of the lidar (--extrinsics FILE)",
+                       without, matched.size()));
+  return std::vector<CutTree>(matched.size());
 }
 
 TimeNs stamp_in(const CsvReader& table) {
@@ -108,7 +128,8 @@ std::vector<HeadCut> place_cuts(const std::vector<LoggedCut>& cuts,
 
 std::vector<TreeFall> write_felled_trees(const std::filesystem::path& folder,
                                          const FelledStand& stand, const std::vector<HeadCut>& cuts,
-                                         const HeadCutLogConfig& config, RunSummary& summary) {
+                                         const HeadCutLogConfig& config, RunSummary& summary,
+                                         Log& log) {
   const bool fells = fells_trees(config);
   const std::vector<FelledTree> felled =
       felled_trees(stand.views, stand.world_from_body, stand.stems,
@@ -124,7 +145,7 @@ std::vector<TreeFall> write_felled_trees(const std::filesystem::path& folder,
                         fell.missed};
   }
   if (!cuts.empty()) {
-    const auto matched = match_cuts(cuts, stand.stems, felled, stand.views, config.cuts);
+    const auto matched = trees_of_cuts(stand, cuts, felled, config.cuts, log);
     std::vector<PlacedCut> rows;
     for (std::size_t i = 0; i < cuts.size(); ++i) {
       rows.push_back({cuts[i].stamp, cuts[i].head_in_world, 0, matched[i].distance_m});

@@ -52,10 +52,12 @@ struct FelledStand {
 // Gives the trees that the views saw and then saw no more, and those that the head cut, the time
 // since when they are missing. Writes felled.csv: these trees where a machine fells, else none.
 // With cuts also cuts.csv (`timestamp,x,y,z,tree_id,distance_m`, world frame, the last two empty
-// where no tree of the list stood). Adds its counts to the summary. Returns what felled.csv holds.
+// where no tree of the list stood). Where most of four cuts or more lie at no tree, none gets one:
+// the log warns of it. Adds its counts to the summary. Returns what felled.csv holds.
 std::vector<TreeFall> write_felled_trees(const std::filesystem::path& folder,
                                          const FelledStand& stand, const std::vector<HeadCut>& cuts,
-                                         const HeadCutLogConfig& config, RunSummary& summary);
+                                         const HeadCutLogConfig& config, RunSummary& summary,
+                                         Log& log);
 
 // cuts.csv of one run to that of another in which everything is moved; nothing where there is none.
 // Throws InputError or OutputError.

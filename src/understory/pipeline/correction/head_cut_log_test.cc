@@ -78,9 +78,10 @@ TEST_F(HeadLog, TheHeadTellsWhatTheViewsCannot) {
   const std::vector<HeadCut> cuts = {{from_seconds(95.0), {5.2, 4.1, 1.0}},
                                      {from_seconds(150.0), {-7.0, 0.0, 1.0}}};
   RunSummary summary;
+  Log log;
   HeadCutLogConfig config;
   config.head_log = "head.csv";
-  (void)write_felled_trees(folder.path(), {views, poses, stems, trees}, cuts, config, summary);
+  (void)write_felled_trees(folder.path(), {views, poses, stems, trees}, cuts, config, summary, log);
   EXPECT_TRUE(std::isnan(trees[0].missing_since_s));
   EXPECT_EQ(trees[1].missing_since_s, 95.0);
   const auto falls = read_tree_falls(folder / "felled.csv");
@@ -126,13 +127,42 @@ struct GoneStand {
   }
 };
 
+// The log has another body frame than the path, as where the extrinsics of the lidar are missing.
+// One cut lies near a tree by chance.
+TEST_F(HeadLog, CutsThatLieAtNoTreesTellNoneOfThem) {
+  GoneStand stand;
+  for (MappedStem& stem : stand.stems)
+    stem.last_view = 30;
+  const FelledStand felled{stand.views, stand.poses, stand.stems, stand.trees};
+  RunSummary summary;
+  Log log;
+  HeadCutLogConfig config;
+  config.head_log = "head.csv";
+  std::vector<HeadCut> cuts;
+  for (std::size_t t = 0; t < 4; ++t)
+    cuts.push_back({from_seconds(70.0), 0.7 * stand.stems[t].point_in_world});
+  cuts[0].head_in_world = stand.stems[0].point_in_world;
+  const auto falls = write_felled_trees(folder.path(), felled, cuts, config, summary, log);
+  ASSERT_EQ(falls.size(), 1U);  // that of tree 8, which the views tell
+  EXPECT_EQ(falls[0].tree_id, 8);
+  EXPECT_EQ(std::get<std::int64_t>(summary.counts.at("head_cuts_without_tree")), 4);
+  ASSERT_EQ(log.warnings().size(), 1U);
+  EXPECT_EQ(log.warnings()[0].key, "felling.head_place");
+  for (std::size_t t = 1; t < 4; ++t)
+    cuts[t].head_in_world = stand.stems[t].point_in_world;
+  Log silent;
+  EXPECT_EQ(write_felled_trees(folder.path(), felled, cuts, config, summary, silent).size(), 5U);
+  EXPECT_TRUE(silent.warnings().empty());
+}
+
 TEST_F(HeadLog, OnlyAMachineFells) {
   GoneStand stand;
   const FelledStand felled{stand.views, stand.poses, stand.stems, stand.trees};
   RunSummary summary;
+  Log log;
   HeadCutLogConfig config;
   EXPECT_FALSE(fells_trees(config));
-  EXPECT_TRUE(write_felled_trees(folder.path(), felled, {}, config, summary).empty());
+  EXPECT_TRUE(write_felled_trees(folder.path(), felled, {}, config, summary, log).empty());
   EXPECT_TRUE(read_tree_falls(folder / "felled.csv").empty());
   EXPECT_EQ(std::get<std::int64_t>(summary.counts.at("trees_felled")), 0);
   EXPECT_EQ(std::get<std::int64_t>(summary.counts.at("trees_missing")), 1);
@@ -141,7 +171,7 @@ TEST_F(HeadLog, OnlyAMachineFells) {
   EXPECT_EQ(stand.trees[7].missing_since_s, 40.0);
   config.fells = true;
   EXPECT_TRUE(fells_trees(config));
-  const auto falls = write_felled_trees(folder.path(), felled, {}, config, summary);
+  const auto falls = write_felled_trees(folder.path(), felled, {}, config, summary, log);
   ASSERT_EQ(falls.size(), 1U);
   EXPECT_EQ(falls[0].tree_id, 8);
   EXPECT_EQ(falls[0].gone_since, from_seconds(40.0));

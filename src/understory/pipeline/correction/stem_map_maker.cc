@@ -105,7 +105,7 @@ RunOutcome StemMapMaker::write() {
   documents_.judge_path();
   std::vector<TreeFall> falls =
       write_felled_trees(folder, {run_.seen, run_.seen_from, run_.stems, run_.trees}, cuts,
-                         config_.harvester, documents_.summary());
+                         config_.harvester, documents_.summary(), place_.log);
   {
     const ScopedTimer timer(place_.times, "writing");
     write_trees_csv(folder / "trees.csv", run_.trees);
