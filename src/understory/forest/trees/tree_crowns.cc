@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "understory/forest/crown_constants.h"
+#include "understory/forest/forest_constants.h"
 #include "understory/util/median.h"
 #include "understory/util/parallel.h"
 
@@ -13,6 +14,7 @@ namespace understory {
 namespace {
 
 using namespace forest_constants::tree_crowns;
+namespace tree_owners = forest_constants::tree_owners;
 
 using Places = std::vector<Eigen::Vector2d>;
 
@@ -229,7 +231,9 @@ TreeCrown crown_of(const std::vector<TreeOwners::Voxel>& voxels, const OwnerTree
   if (widths.empty()) return crown;
   const std::size_t base = base_of(widths, tree.radius_m);
   if (base == widths.size()) return crown;
-  crown.base_m = static_cast<double>(base) * kLayer;
+  const double base_m = static_cast<double>(base) * kLayer;
+  // Lower layers hold what touches the stem alone, so this one is the lowest that can be wide.
+  if (base_m > tree_owners::kUndergrowth) crown.base_m = base_m;
   Places all;
   for (std::size_t i = base; i < layers.size(); ++i)
     all.insert(all.end(), layers[i].begin(), layers[i].end());

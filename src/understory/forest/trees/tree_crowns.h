@@ -9,11 +9,12 @@
 namespace understory {
 
 // The crown of a tree, from the cubes that belong to it. NaN where none was seen. Area and volume
-// are also NaN, and the outline is empty, where it was seen from one side only.
+// are also NaN, and the outline is empty, where it was seen from one side only. The base is NaN
+// where the tree is wide down to 1.5 m: below, nothing tells its branches from undergrowth.
 struct TreeCrown {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-  double base_m = kUnknown;     // above the ground: where the layers become wide and stay so
+  double base_m = kUnknown;     // above the ground: where the layers become wide, over 1.5 m
   double area_m2 = kUnknown;    // of its outline seen from above
   double volume_m3 = kUnknown;  // sum of the outlines of its layers
   // 1: its upper half shows a stem and nothing beside it, as a snag does; 0: it has branches.

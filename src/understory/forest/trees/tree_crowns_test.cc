@@ -194,5 +194,25 @@ TEST(TreeCrowns, ABushAtTheFootIsNotTheBase) {
   EXPECT_NEAR(crown_with_bush(4.2).base_m, 8.0, 0.51);
 }
 
+// Branches or undergrowth all the way down. The base was 1.5 m once, where nobody saw one.
+TEST(TreeCrowns, ATreeThatIsWideDownToTheUndergrowthHasAnAreaAndNoBase) {
+  for (const double low : {0.4, 1.8, 2.6}) {
+    TreeOwners owners;
+    for (double height = 0.3; height < 15.0; height += 0.1)
+      add_disc(owners, 0.1, height);
+    for (double height = low; height < 15.0; height += 0.1)
+      add_disc(owners, 2.0, height);
+    const std::vector<OwnerTree> trees = {owner_tree(15.0)};
+    owners.find(trees, {});
+    const TreeCrown crown = measure_crowns(owners, trees)[0];
+    EXPECT_NEAR(crown.area_m2, M_PI * 4.0, 0.15 * M_PI * 4.0) << low;
+    if (low < 2.0) {
+      EXPECT_TRUE(std::isnan(crown.base_m)) << low;
+    } else {
+      EXPECT_NEAR(crown.base_m, low, 0.51);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace understory
