@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 
 // The fitted and chosen numbers of the layer `pipeline` that are no settings, which stand in the
 // Config structs. One namespace for each file that uses them. A comment gives the unit (none: a
@@ -300,6 +301,11 @@ inline constexpr double kLeastShareAgain = 0.8;
 // s: standard deviation of a clock that is known well enough. A machine that turns with half a
 // radian a second puts a point 20 m away 1 cm off by twice of it [chosen]
 inline constexpr double kSureSdS = 0.001;
+// rad: that of the rotation of an IMU on a lidar that is known well enough [chosen: three times the
+// goal of a minute's walk, docs/method/calibration.md]
+inline constexpr double kSureTurnSd = 0.3 * std::numbers::pi / 180.0;
+// m: that of its place, along each axis [chosen: two and a half times that goal]
+inline constexpr double kSurePlaceSdM = 0.05;
 }  // namespace imu_calibration
 
 namespace stand_plots {  // pipeline/inventory/stand_plots.cc

@@ -160,14 +160,16 @@ std::vector<std::string> keep_unknown(const Fit& fit, Given& given) {
   std::vector<std::string> kept;
   const char* directions[] = {"", " in one direction", " in two directions", ""};
   if (const int count = keep_directions(fit, 0, kMostRotation, given); count > 0)
-    kept.push_back(fmt::format("the rotation{} is kept as given: it needs turns about two axes",
-                               directions[count]));
+    kept.push_back(fmt::format(
+        "the turn of the IMU{} was not found and stays as given: tilt the sensor to all sides, too",
+        directions[count]));
   if (const int count = keep_directions(fit, 3, kMostPlaceM, given); count > 0)
-    kept.push_back(fmt::format("the place{} is kept as given: it needs quick turns and tilting",
-                               directions[count]));
+    kept.push_back(fmt::format(
+        "the place of the IMU{} was not found and stays as given: turn and tilt more quickly",
+        directions[count]));
   if (std::sqrt(fit.covariance(kLatenessParameter, kLatenessParameter)) > kMostLatenessSdS) {
     given.information(kLatenessParameter, kLatenessParameter) += kKept;
-    kept.push_back("the time offset is kept as given: it needs quick turns");
+    kept.push_back("the clock was not found and stays as given: turn more quickly");
   }
   return kept;
 }

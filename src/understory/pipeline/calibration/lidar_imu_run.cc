@@ -66,26 +66,53 @@ std::string calibration_json(const LidarImuOutcome& outcome) {
   return json.dump(2) + "\n";
 }
 
+// Below, a standard deviation is that of a value that was kept as given, but for rounding: rad, m,
+// s.
+constexpr double kKeptSd = 1e-6;
+
+// A value with its standard deviation. One that was not found has none, and says so.
+std::string with_sd(double value, double sd, double scale, int decimals) {
+  if (sd < kKeptSd) return fmt::format("{:.{}f} (not found)", scale * value, decimals);
+  return fmt::format("{:.{}f} ± {:.{}f}", scale * value, decimals, scale * sd, decimals);
+}
+
+std::string axes_with_sds(const Eigen::Vector3d& values, const Eigen::Vector3d& sds, double scale,
+                          int decimals) {
+  return fmt::format("x {}, y {}, z {}", with_sd(values.x(), sds.x(), scale, decimals),
+                     with_sd(values.y(), sds.y(), scale, decimals),
+                     with_sd(values.z(), sds.z(), scale, decimals));
+}
+
+std::string clock_text(double imu_late_s, double sd_s) {
+  return fmt::format("for one moment the IMU's stamp is {} ms {} than the lidar's",
+                     with_sd(std::abs(imu_late_s), sd_s, 1e3, 2),
+                     imu_late_s < 0.0 ? "earlier" : "later");
+}
+
+// What was found, how sure it is, how far the given values are off, and what to do with it.
 std::string summary_of(const LidarImuOutcome& outcome, const Rig& given, const fs::path& folder) {
   const LidarImuResult& result = outcome.result;
   const Eigen::Matrix<double, 7, 1> sd = result.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  const Eigen::Vector3d& t = result.lidar_from_imu.translation();
   const Eigen::Quaterniond& q = result.lidar_from_imu.rotation();
   std::string text = fmt::format(
-      "{:.1f} s of path\nlateness of the IMU  {:.2f} ± {:.2f} ms\nlidar_from_imu       place "
-      "({:.4f}, {:.4f}, {:.4f}) ± ({:.4f}, {:.4f}, {:.4f}) m\n                     quaternion xyzw "
-      "({:.5f}, {:.5f}, {:.5f}, {:.5f}), about x, y, z ± ({:.3f}, {:.3f}, {:.3f}) degrees\n",
-      result.duration_s, 1e3 * result.imu_late_s, 1e3 * sd[6], t.x(), t.y(), t.z(), sd[3], sd[4],
-      sd[5], q.x(), q.y(), q.z(), q.w(), kDegreesARad * sd[0], kDegreesARad * sd[1],
-      kDegreesARad * sd[2]);
+      "Found from {:.1f} s of motion; ± is one standard deviation:\n"
+      "place of the IMU in the lidar's frame  {} m\n"
+      "turn of the IMU, as a rotation vector  {} degrees\n"
+      "the same turn, as quaternion xyzw      ({:.5f}, {:.5f}, {:.5f}, {:.5f})\n"
+      "clock                                  {}\n",
+      result.duration_s,
+      axes_with_sds(result.lidar_from_imu.translation(), sd.segment<3>(3), 1.0, 4),
+      axes_with_sds(so3_log(q), sd.head<3>(), kDegreesARad, 3), q.x(), q.y(), q.z(), q.w(),
+      clock_text(result.imu_late_s, sd[6]));
   if (given.body_from_imu) {
     const Pose change =
         (given.body_from_lidar.inverse() * *given.body_from_imu).inverse() * result.lidar_from_imu;
-    text += fmt::format("from the given one   {:.3f} degrees, {:.4f} m ({})\n",
-                        kDegreesARad * so3_log(change.rotation()).norm(),
-                        change.translation().norm(), given.imu_extrinsic_source);
+    text += fmt::format(
+        "The given extrinsics differ from it by {:.3f} degrees and {:.4f} m (IMU: {})\n",
+        kDegreesARad * so3_log(change.rotation()).norm(), change.translation().norm(),
+        given.imu_extrinsic_source);
   }
-  return text + fmt::format("extrinsics: {}", (folder / kExtrinsicsFile).string());
+  return text + fmt::format("Map with it: --extrinsics {}", (folder / kExtrinsicsFile).string());
 }
 
 void write_path(const fs::path& path, const std::vector<StampedPose>& world_from_lidar) {
@@ -107,11 +134,28 @@ struct MappedCalibration {
   std::string alone_because;  // why the path with the IMU does not count; empty: it does
 };
 
+// What was found, but too roughly to be of use.
+std::vector<std::string> hardly_known(const LidarImuResult& result) {
+  const Eigen::Matrix<double, 7, 1> sd = result.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  std::vector<std::string> rough;
+  if (const double most = sd.head<3>().maxCoeff(); most > kSureTurnSd)
+    rough.push_back(fmt::format("the turn to {:.1f} degrees", kDegreesARad * most));
+  if (const double most = sd.segment<3>(3).maxCoeff(); most > kSurePlaceSdM)
+    rough.push_back(fmt::format("the place to {:.2f} m", most));
+  if (sd[6] > kSureSdS) rough.push_back(fmt::format("the clock to {:.1f} ms", 1e3 * sd[6]));
+  return rough;
+}
+
 void judge(LidarImuOutcome& outcome, const MappedCalibration& found) {
   outcome.reasons = outcome.result.kept;
+  if (const std::vector<std::string> rough = hardly_known(outcome.result); !rough.empty())
+    outcome.reasons.push_back(
+        fmt::format("only roughly known are {} (standard deviations). Record a minute with quick "
+                    "turns and tilting",
+                    fmt::join(rough, ", ")));
   if (!found.alone_because.empty())
     outcome.reasons.push_back(
-        "the values rest on the path of the lidar alone and are less exact: " +
+        "the values rest on the path of the lidar alone and are about half as exact: " +
         found.alone_because);
   if (!outcome.reasons.empty()) outcome.status = RunStatus::kPartial;
   if (found.path.doubts.empty()) return;
