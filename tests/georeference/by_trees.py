@@ -203,6 +203,7 @@ def bad(folder):
             ("grid", RUN, grid, ("--tree-map-crs", "EPSG:4326"), "is no place in it"),
             ("bare", RUN, grid, ("--near", EAST, NORTH), "Give --tree-map-crs EPSG:CODE"),
             ("words", RUN, RUN / "trajectory.tum", (), "expected a map of trees"),
+            ("folder", RUN, RUN, (), "is a folder: expected one file with a map of trees"),
             ("few", few, MAP, (), "found 4")):
         done = by_trees(run, tree_map, folder / f"out_{name}", *more)
         assert done.returncode == 3, (name, done.returncode, done.stderr, done.stdout)

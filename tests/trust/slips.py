@@ -66,6 +66,10 @@ def settings(folder):
                                   (("inventory", "x.laz", "-o", folder / "run"), "inventory.stems.min_dbh_m=0.1", "stems.min_dbh_m")):
         done = program(*words, "--set", setting)
         assert done.returncode == 2 and f"did you mean {meant}?" in done.stderr, done
+    for front_end, setting, other in (("dense", "stems.keep.distance_m=1", "sparse"), ("sparse", "keyframe.distance_m=1", "dense")):
+        done = program("map", "x.mcap", "-o", folder / "run", "--front-end", front_end, "--set", setting)
+        said = f"--set {setting.split('=')[0]}: is a setting of --front-end {other}"
+        assert done.returncode == 2 and said in done.stderr, done
     done = program("map", "sim:demo?sed=4", "-o", folder / "run")
     assert done.returncode == 2 and "sim:demo?sed: unknown key (did you mean seed?)" in done.stderr, done
 
@@ -77,6 +81,9 @@ def options(folder):
         done = program(command, "x.mcap", "-o", folder / "run", typed, "a=b")
         assert done.returncode == 2 and done.stderr.startswith("error: "), done
         assert f"'{typed.split('=')[0]}'" in done.stderr and f"did you mean '{meant}'" in done.stderr, done
+    for typed in ("--registration", "--from-s"):  # nothing like it: --version and --crs were proposed once
+        done = program("map", "x.mcap", "-o", folder / "run", typed, "3")
+        assert done.returncode == 2 and f"no option '{typed}'" in done.stderr and "did you mean" not in done.stderr, done
     done = program("calibrate", "imu", "x.mcap", "-o", folder / "run", "--facotr", "2")
     assert done.returncode == 2 and "calibrate imu has no option" in done.stderr and "'--factor'" in done.stderr, done
     done = program("map", "x.mcap", "y.mcap", "z.mcap")

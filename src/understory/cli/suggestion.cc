@@ -90,7 +90,8 @@ void refuse_run(const std::string& recording) {
 
 std::string nearest_word(const std::string& given, const std::vector<std::string>& words) {
   std::string best;
-  std::size_t least = given.size() / 2 + 1;  // half of the letters may be wrong
+  // Half of the letters may be wrong. The dashes of an option are no letters.
+  std::size_t least = (given.size() - std::min(given.size(), given.find_first_not_of('-'))) / 2 + 1;
   for (const std::string& word : words) {
     const bool begun = given.size() >= 2 && word.starts_with(given);
     const std::size_t apart = begun ? 1 : letters_apart(given, word);

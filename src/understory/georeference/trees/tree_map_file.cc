@@ -181,7 +181,12 @@ TreeMapFile read_layer(const std::filesystem::path& path) {
 
 TreeMapFile read_tree_map(const std::filesystem::path& path, const std::string& crs) {
   if (!std::filesystem::is_regular_file(path))
-    throw InputError(path.string(), "", "expected a map of trees: no such file");
+    throw InputError(
+        path.string(), "",
+        std::filesystem::is_directory(path)
+            ? "is a folder: expected one file with a map of trees, such as the trees.csv or "
+              "trees.gpkg of a run"
+            : "expected a map of trees: no such file");
   const std::string name = lower(path.filename().string());
   const bool table = name.ends_with(".csv") || name.ends_with(".csv.gz") || name.ends_with(".txt");
   TreeMapFile map = table ? read_table(path) : read_layer(path);

@@ -1,5 +1,6 @@
 #include "understory/pipeline/mapping/front_end_config.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "understory/georeference/plot_file.h"
@@ -31,6 +32,32 @@ Adapted<SparseMappingConfig> adapt_one(const SparseMappingConfig& asked,
                                        const ConfigOrigins& origins, const SensorTraits& /*traits*/,
                                        const RunConditions& conditions) {
   return adapt(asked, origins, conditions);
+}
+
+// Those of the settings that only the other front end has.
+template <typename Table>
+std::vector<std::string> keys_of(const std::vector<std::string>& settings, const Table& other) {
+  std::vector<std::string> keys;
+  for (const std::string& setting : settings) {
+    const std::string key = setting.substr(0, setting.find('='));
+    const auto& fields = other.fields();
+    if (std::any_of(fields.begin(), fields.end(), [&](const auto& f) { return f.key == key; }))
+      keys.push_back(key);
+  }
+  return keys;
+}
+
+// The problems of one front end. An unknown key that is one of the other's is named as such.
+ConfigError with_other_front_end(const ConfigError& error, const std::vector<std::string>& keys,
+                                 const std::string& other) {
+  std::vector<std::string> problems = error.problems();
+  for (std::string& problem : problems) {
+    for (const std::string& key : keys) {
+      if (problem.starts_with("--set " + key + ": unknown key"))
+        problem = "--set " + key + ": is a setting of --front-end " + other;
+    }
+  }
+  return ConfigError(std::move(problems));
 }
 
 }  // namespace
@@ -79,12 +106,22 @@ ReadConfig<FrontEndConfig> read_front_end_config(const std::string& front_end,
                                                  const std::string& file,
                                                  const std::vector<std::string>& settings,
                                                  Log& log) {
-  if (front_end == kSparseFrontEnd) {
-    auto read = read_sparse_mapping_config(profile, file, settings, log);
+  const bool sparse = front_end == kSparseFrontEnd;
+  try {
+    if (sparse) {
+      auto read = read_sparse_mapping_config(profile, file, settings, log);
+      return {std::move(read.config), std::move(read.origins)};
+    }
+    auto read = read_dense_mapping_config(profile, file, settings);
     return {std::move(read.config), std::move(read.origins)};
+  } catch (const ConfigError& error) {
+    DenseMappingConfig dense;
+    SparseMappingConfig stems;
+    throw with_other_front_end(error,
+                               sparse ? keys_of(settings, dense_mapping_table(dense))
+                                      : keys_of(settings, sparse_mapping_table(stems)),
+                               sparse ? kDenseFrontEnd : kSparseFrontEnd);
   }
-  auto read = read_dense_mapping_config(profile, file, settings);
-  return {std::move(read.config), std::move(read.origins)};
 }
 
 FrontEndConfig reread_front_end_config(
