@@ -118,7 +118,7 @@ inline constexpr double kAreaCell = 2.0;
 // m above the ground: higher points are no tree [bound: the tallest trees have 116 m]
 inline constexpr double kHighest = 120.0;
 // m: the origin of slices and stems is a multiple of it. It is itself a multiple of the cells of
-// all grids (1.5, 2, 8, 12 and 20 cm; 0.5, 1, 2 and 8 m) [chosen]
+// all grids (1.5, 2, 8, 12, 16, 20 and 24 cm; 0.5, 1, 2 and 8 m) [chosen]
 inline constexpr double kOriginStep = 48.0;
 // m around a stem whose points are kept for a look at it [chosen]
 inline constexpr double kSegmentReach = 1.5;

@@ -13,6 +13,7 @@
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/form/shared_feet.h"
 #include "understory/forest/ground/uphill_side.h"
+#include "understory/forest/stems/blurred_stems.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/tiles/stem_tiles.h"
 #include "understory/forest/trees/double_images.h"
@@ -262,6 +263,7 @@ void remark_on_stems(const StemHarvest& gathered, const InventoryConfig& config,
         "and canopy models are not affected.",
         near_breast, config.stems.lowest_m, config.stems.highest_m, per_m2));
   }
+  if (gathered.blur_m > 0.0) result.remarks.push_back(blur_remark(gathered.blur_m));
 }
 
 void remark(const StemHarvest& gathered, const InventoryConfig& config, InventoryResult& result) {

@@ -336,8 +336,6 @@ inline constexpr double kOvalScatter = 0.2;
 namespace noisy_cylinder {  // forest/stems/noisy_cylinder.cc
 // m: scatter of ranges at least [bound: noise of lidars]
 inline constexpr double kLeastScatter = 0.004;
-// m: scatter of ranges at most [chosen]
-inline constexpr double kMostScatter = 0.06;
 // Directions from which a stem may have been seen [chosen]
 inline constexpr int kViews = 24;
 // Share of a direction that gave nothing: keeps logarithms finite [bound: rounding]
@@ -449,7 +447,7 @@ inline constexpr double kWindow = 8.0;
 // m: a group that is longer is cut [chosen: longer than a large tree's points at breast height]
 inline constexpr double kLongest = 4.0;
 // m: two cells of the coarsest grouping [bound: cells that touch]
-inline constexpr double kCellSlack = 0.3;
+inline constexpr double kCellSlack = 0.5;
 }  // namespace point_groups
 
 }  // namespace understory::stem_constants

@@ -264,7 +264,8 @@ class Estimator {
     radius_ = found[4];
     taper_ = found[5];
     result.covariance = s2 * solver.inverse();
-    scatter_ = std::clamp(std::sqrt(0.5 * sums.square / sums.weight), kLeastScatter, kMostScatter);
+    scatter_ = std::clamp(std::sqrt(0.5 * sums.square / sums.weight), kLeastScatter,
+                          config_.most_scatter_m);
     strays_ = std::clamp(1.0 - sums.weight / total_, kLeastStrays, config_.most_strays);
     learn_views(seen.head(lobes_.rows()) + seen.segment(lobes_.rows(), lobes_.rows()));
     return true;

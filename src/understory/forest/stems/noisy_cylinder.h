@@ -30,17 +30,18 @@ struct NoisyCylinder {
 
 // The prior of a stem's form before it is fitted; tapers and slopes are tangents.
 struct NoisyCylinderConfig {
-  double usual_taper = -0.008;  // of the radius per metre of height
-  double taper_sd = 0.006;      // how far stems differ from it
-  double slope_sd = 0.03;       // how far the slope may leave that of the start
-  int max_points = 400;         // every n-th where there are more
-  int cycles = 20;              // of two steps and an extrapolation, at most
-  double stray_reach_m = 0.1;   // beyond the radius: points of no stem are spread so far
-  double most_strays = 0.5;     // share of the returns that are of no stem, at most
-  double held_radius_m = 0.0;   // a smaller radius is held at this one; 0: such a fit fails
+  double usual_taper = -0.008;   // of the radius per metre of height
+  double taper_sd = 0.006;       // how far stems differ from it
+  double slope_sd = 0.03;        // how far the slope may leave that of the start
+  int max_points = 400;          // every n-th where there are more
+  int cycles = 20;               // of two steps and an extrapolation, at most
+  double stray_reach_m = 0.1;    // beyond the radius: points of no stem are spread so far
+  double most_strays = 0.5;      // share of the returns that are of no stem, at most
+  double most_scatter_m = 0.06;  // of ranges
+  double held_radius_m = 0.0;    // a smaller radius is held at this one; 0: such a fit fails
 };
 
-// Points should be those within about 10 cm of the stem's surface. Deterministic.
+// Points should be those within `stray_reach_m` of the stem's surface. Deterministic.
 [[nodiscard]] NoisyCylinder fit_noisy_cylinder(const std::vector<SlicePoint>& points,
                                                const StemFit& start,
                                                const NoisyCylinderConfig& config);

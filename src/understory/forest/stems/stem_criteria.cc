@@ -3,23 +3,43 @@
 #include <algorithm>
 #include <cmath>
 
+#include "understory/forest/blur_constants.h"
 #include "understory/forest/stem_constants.h"
 
 namespace understory {
 namespace {
 
+using namespace blur_constants;
 using namespace stem_constants::stem_detector;
 
 // How much may lie beside the surface, as the sum of both ratios of StemEvidence, for it still to
 // be a stem. In a thicket it takes many slices that agree to accept one; a steep lean is what a
 // line through scattered points has.
-double max_clutter(const StemFitResult& fit, double lean_deg) {
+double max_clutter(const StemFitResult& fit, double lean_deg, const SliceCut& cut) {
   const auto rings = static_cast<double>(fit.stem.slices.size());
   if (lean_deg > kSteepLeanDeg) return kSteepClutter;
   const double limit =
       std::min(kMostClutter, kClutterOfTwo + kClutterPerRing * std::max(0.0, rings - 2.0));
+  if (cut.blur_m > 0.0) return std::max(limit, kBlurredClutter);
   const bool noisy = fit.evidence.scatter_m > kNoisyScatter && rings < kFewRings;
   return noisy ? std::min(limit, kNoisyClutter) : limit;
+}
+
+// m: how much the points of a stem may scatter.
+double max_scatter(const StemFit& stem, const SliceCut& cut) {
+  return std::max(
+             {kMostScatter, kMostScatterShare * stem.radius_m, kBlurredScatters * cut.blur_m}) +
+         kScatterSlack;
+}
+
+// Whether a thick stem in a blurred cloud is one. Foliage has a vague radius, or more scatter than
+// stems, or it shows another side in each slice.
+bool is_blurred_stem(const StemFitResult& fit, const SliceCut& cut, double blur_m) {
+  const StemFit& stem = fit.stem;
+  return std::sqrt(std::max(0.0, stem.covariance(2, 2))) <= kBlurredSd * stem.radius_m &&
+         fit.evidence.scatter_m <= kMostOfBlur * blur_m &&
+         (cut.blur_m == 0.0 ||
+          (fit.evidence.fill >= kBlurredFill && fit.evidence.even_arc_deg >= kBlurredArcDeg));
 }
 
 // From the lowest slice that shows a stem to the highest one.
@@ -90,6 +110,11 @@ double lean_deg_of(const StemFit& stem) {
 
 bool is_flat_column(const StemFitResult& fit, const SliceCut& cut,
                     const StemDetectorConfig& config) {
+  // A band as wide as the blur holds all points that are near: it always stands clear.
+  if (cut.blur_m > 0.0 || (fit.stem.radius_m > kThickBlurs * config.blur_m && config.blur_m > 0.0 &&
+                           fit.evidence.scatter_m > max_scatter(fit.stem, cut))) {
+    return false;
+  }
   return has_points_of_stem(fit, cut, config) && stands_clear(fit, config) &&
          fit.stem.lowest_m <= kBreastHeight + kBeginsAbove;
 }
@@ -104,7 +129,9 @@ bool is_stem(const StemFitResult& fit, const SliceCut& cut, const StemDetectorCo
       stem.arc_deg < config.min_arc_deg || e.even_arc_deg < kEvenArcOfLeast * config.min_arc_deg) {
     return false;
   }
-  if (is_clear_column(fit, config, std::sqrt(std::max(0.0, stem.covariance(2, 2))))) return true;
+  if (cut.blur_m == 0.0 &&
+      is_clear_column(fit, config, std::sqrt(std::max(0.0, stem.covariance(2, 2)))))
+    return true;
   if (cut.only_clear) return reaches_top(stem, config) && stands_alone(fit, config);
   if (e.even_arc_deg < kEvenArcShare * stem.arc_deg) return false;
   // What begins higher is a branch or a crown.
@@ -119,8 +146,7 @@ bool is_stem(const StemFitResult& fit, const SliceCut& cut, const StemDetectorCo
     return false;
   }
   return 4 * e.inside <= e.on && e.inside_ratio <= kMostInside &&
-         clutter <= max_clutter(fit, lean_deg) &&
-         e.scatter_m <= std::max(kMostScatter, kMostScatterShare * stem.radius_m) + kScatterSlack;
+         clutter <= max_clutter(fit, lean_deg, cut) && e.scatter_m <= max_scatter(stem, cut);
 }
 
 // A stem's pieces were filled to 0.67 and more on the tuning maps. What shows in few slices has to
@@ -135,7 +161,8 @@ bool is_stem_still(const StemFitResult& fit, const SliceCut& cut,
       e.fill < kClearFill) {
     return false;
   }
-  if (is_clear_column(fit, config, kClearSpreads * stem.spread_m)) return true;
+  if (config.blur_m > 0.0 && !is_blurred_stem(fit, cut, config.blur_m)) return false;
+  if (cut.blur_m == 0.0 && is_clear_column(fit, config, kClearSpreads * stem.spread_m)) return true;
   if (e.fill < kLeastFill) return false;
   if (cut.only_clear) return reaches_top(stem, config) && stands_alone(fit, config);
   const double all = (config.highest_m - config.lowest_m) / config.slice_m;

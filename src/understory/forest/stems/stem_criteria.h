@@ -12,6 +12,7 @@ struct SliceCut {
   int min_slices = 3;
   double reach_m = 0.0;     // between neighbours of one group of points
   double band_m = 0.0;      // on either side of a circle: points on it
+  double blur_m = 0.0;      // of a blurred cloud: scatter that stems have; 0: no such cut
   bool only_clear = false;  // columns that stand clear or alone, and nothing else
 };
 

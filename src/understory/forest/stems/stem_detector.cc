@@ -5,11 +5,13 @@
 #include <functional>
 #include <limits>
 
+#include "understory/forest/blur_constants.h"
 #include "understory/forest/search/circle_search.h"
 #include "understory/forest/search/foliage_columns.h"
 #include "understory/forest/search/point_groups.h"
 #include "understory/forest/search/ring_linker.h"
 #include "understory/forest/stem_constants.h"
+#include "understory/forest/stems/blurred_stems.h"
 #include "understory/forest/stems/breast_height_sections.h"
 #include "understory/forest/stems/not_a_tree.h"
 #include "understory/forest/stems/point_index.h"
@@ -23,6 +25,7 @@
 namespace understory {
 namespace {
 
+using namespace blur_constants;
 using namespace stem_constants::stem_detector;
 
 std::vector<Ring> find_rings(const std::vector<SlicePoint>& points,
@@ -120,8 +123,17 @@ void mark_explained(const StemFit& stem, const PointIndex& index,
   });
 }
 
+double blurred_band_m(const StemDetectorConfig& config) {
+  return std::max(kThickBand, kBlurredBand * config.blur_m);
+}
+
 SliceCut cut_of(StemCut cut, const StemDetectorConfig& config) {
   if (cut == StemCut::kThin) return {config.slice_m, config.min_slices, kThinReach, kThinBand};
+  if (cut == StemCut::kBlurred) {
+    return {kBlurredSlices * config.slice_m, config.min_slices,
+            std::max(kThickReach, kBlurredReach * config.blur_m), blurred_band_m(config),
+            config.blur_m};
+  }
   return {kThickSlices * config.slice_m, kLeastThickSlices, kThickReach, kThickBand};
 }
 
@@ -160,6 +172,12 @@ struct Search {
   std::vector<char> explained;
   std::vector<StemFit> stems;
 
+  // After stems were replaced.
+  void know_anew() {
+    explained.assign(points.size(), 0);
+    for (const StemFit& stem : stems)
+      mark_explained(stem, index, points, explained);
+  }
   void know(const StemFit& stem) {
     stems.push_back(stem);
     mark_explained(stem, index, points, explained);
@@ -314,10 +332,19 @@ void add_stems(const SliceCut& cut, const StemDetectorConfig& config, const Stem
 }  // namespace
 
 std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points, const StemDetectorConfig& config,
-                                  const StemSearchArea& where, const ProgressSink& progress) {
+                                  const StemSearchArea& where, const ProgressSink& progress,
+                                  double* blur_m) {
   Search search(points);
   for (const StemCut cut : {StemCut::kThin, StemCut::kThick})
     add_stems(cut_of(cut, config), config, where, progress, search);
+  const double blur = add_blurred_stems(
+      config,
+      [&](StemCut cut, const StemDetectorConfig& blurred) {
+        return detect_stems_in_cut(cut, points, {}, blurred, where, progress);
+      },
+      search.stems);
+  if (blur_m != nullptr) *blur_m = blur;
+  search.know_anew();
   add_foliage_stems(config, where, progress, search);
   sort_by_place(search.stems);
   return search.stems;
@@ -381,7 +408,7 @@ std::vector<StemFit> detect_hidden_stems(
 
 double stem_search_reach(const StemDetectorConfig& config) {
   const double radius = 0.5 * config.max_dbh_m;
-  return kRingsBeyond + group_reach_m(radius, std::max(kThinBand, kThickBand));
+  return kRingsBeyond + group_reach_m(radius, std::max(kThinBand, blurred_band_m(config)));
 }
 
 void sort_by_place(std::vector<StemFit>& stems) {

@@ -30,6 +30,9 @@ struct StemDetectorConfig {
   // Thinner stems are searched in the end, among what no other stem explains; 0: they are not. No
   // setting: see search_of.
   double thin_dbh_m = 0.0;
+  // Standard deviation of the points about the stems of a blurred cloud; 0: it is sharp. No
+  // setting: see add_blurred_stems.
+  double blur_m = 0.0;
   double max_dbh_m = 1.2;
   int min_returns = 25;       // of the cloud on the stem's surface
   double min_arc_deg = 60.0;  // of the circle that points cover, over all slices
@@ -85,16 +88,19 @@ struct StemSearchArea {
 // Stems among the points of the slices. Points may be in any order, and come back sorted by place:
 // there are too many for a second copy. The same points give the same stems for any number of
 // threads; what is far away does not matter. Stems come sorted by x, then y. Polls `progress`.
+// `blur_m` is told what add_blurred_stems gave.
 [[nodiscard]] std::vector<StemFit> detect_stems(std::vector<SlicePoint>& points,
                                                 const StemDetectorConfig& config,
                                                 const StemSearchArea& where = {},
-                                                const ProgressSink& progress = {});
+                                                const ProgressSink& progress = {},
+                                                double* blur_m = nullptr);
 
-// The searches of detect_stems, one after the other: thin slices, thick ones, columns within
-// foliage. The last one, for columns thinner than min_dbh_m, is to come after that for hidden
-// stems. Each looks at the points that no stem of those before explains. Of a cloud in tiles it has
-// to know those beyond the tile. Gives the stems with the centre in the area.
-enum class StemCut { kThin, kThick, kFoliage, kThinnest };
+// The searches of detect_stems, one after the other: thin slices, thick ones, thick stems of a
+// blurred cloud, columns within foliage. The last one, for columns thinner than min_dbh_m, is to
+// come after that for hidden stems. Each looks at the points that no known stem explains; that of a
+// blurred cloud knows of none. Of a cloud in tiles it has to know those beyond the tile. Gives the
+// stems with the centre in the area.
+enum class StemCut { kThin, kThick, kBlurred, kFoliage, kThinnest };
 [[nodiscard]] std::vector<StemFit> detect_stems_in_cut(StemCut cut, std::vector<SlicePoint>& points,
                                                        const std::vector<StemFit>& known,
                                                        const StemDetectorConfig& config,

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 
+#include "understory/forest/blur_constants.h"
 #include "understory/forest/stem_constants.h"
 #include "understory/forest/stems/arc_bins.h"
 #include "understory/forest/stems/noisy_cylinder.h"
@@ -16,6 +17,7 @@
 namespace understory {
 namespace {
 
+using namespace blur_constants;
 using namespace stem_constants::stem_fit;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -64,11 +66,12 @@ System build_system(const std::vector<SlicePoint>& points, const StemFit& stem,
 }
 
 // Enough points to fit by: those near the surface of the start, every n-th where they are many.
-std::vector<SlicePoint> sample_of(const std::vector<SlicePoint>& points, const StemFit& start) {
+std::vector<SlicePoint> sample_of(const std::vector<SlicePoint>& points, const StemFit& start,
+                                  double reach) {
   std::vector<SlicePoint> near;
   const StemAxis axis(start);
   for (const SlicePoint& point : points) {
-    if (std::abs(axis.surface_error(point)) < kSampleReach) near.push_back(point);
+    if (std::abs(axis.surface_error(point)) < reach) near.push_back(point);
   }
   const std::size_t stride = near.size() / kEnoughPoints + 1;
   std::vector<SlicePoint> some;
@@ -77,9 +80,15 @@ std::vector<SlicePoint> sample_of(const std::vector<SlicePoint>& points, const S
   return some;
 }
 
+// m: the scatter of points about a stem at most.
+double most_scatter_m(const StemDetectorConfig& config) {
+  return std::max(kMostScatter, kMostBlurs * config.blur_m);
+}
+
 // 1.48 times the median distance from the surface of the returns within `reach`, in steps of a
 // quarter of a millimetre.
-double scatter_of(const std::vector<SlicePoint>& points, const StemFit& stem, double reach) {
+double scatter_of(const std::vector<SlicePoint>& points, const StemFit& stem, double reach,
+                  double most) {
   constexpr double kStep = 0.00025;
   constexpr std::size_t kSteps = 256;
   std::array<std::uint64_t, kSteps> counts{};
@@ -91,13 +100,12 @@ double scatter_of(const std::vector<SlicePoint>& points, const StemFit& stem, do
     counts[std::min(kSteps - 1, static_cast<std::size_t>(e / kStep))] += point.returns;
     returns += point.returns;
   }
-  if (returns == 0) return kMostScatter;
+  if (returns == 0) return most;
   std::uint64_t passed = 0;
   std::size_t middle = 0;
   for (; middle + 1 < kSteps && 2 * passed < returns; ++middle)
     passed += counts[middle];
-  return std::clamp(kSdOverMad * kStep * (static_cast<double>(middle) - 0.5), kLeastScatter,
-                    kMostScatter);
+  return std::clamp(kSdOverMad * kStep * (static_cast<double>(middle) - 0.5), kLeastScatter, most);
 }
 
 // Which parts of the surface were seen: steps of 10 degrees in each slice.
@@ -297,7 +305,7 @@ void take_over(const NoisyCylinder& fit, const std::vector<SlicePoint>& points,
   stem.slope = fit.slope;
   stem.radius_m = fit.radius_m;
   stem.taper = fit.taper;
-  result.evidence.scatter_m = std::clamp(fit.scatter_m, kLeastScatter, kMostScatter);
+  result.evidence.scatter_m = std::clamp(fit.scatter_m, kLeastScatter, most_scatter_m(config));
   judge(points, config, result);
   result.evidence.scatter_m = fit.scatter_m;
   stem.scatter_m = fit.scatter_m;
@@ -312,8 +320,13 @@ StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& sta
   StemFit& stem = result.stem;
   stem = start;
   stem.taper = kUsualTaper;
-  const std::vector<SlicePoint> some = sample_of(points, stem);
-  double scatter = std::max(kFirstScatter, scatter_of(some, stem, kScatterReach));
+  const std::vector<SlicePoint> some =
+      sample_of(points, stem, std::max(kSampleReach, kReachBlurs * config.blur_m));
+  const auto scatter_now = [&] {
+    return scatter_of(some, stem, std::max(kScatterReach, kScatterBlurs * config.blur_m),
+                      most_scatter_m(config));
+  };
+  double scatter = std::max({kFirstScatter, config.blur_m, scatter_now()});
   System system;
   for (int iteration = 0; iteration < kMostSteps; ++iteration) {
     system = build_system(some, stem, start, scatter);
@@ -326,7 +339,7 @@ StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& sta
     stem.taper += step[5];
     if (stem.radius_m < kLeastRadiusShare * config.min_dbh_m || stem.radius_m > config.max_dbh_m)
       return result;
-    if (iteration >= kFixedScatterSteps) scatter = scatter_of(some, stem, kScatterReach);
+    if (iteration >= kFixedScatterSteps) scatter = scatter_now();
     if (iteration > 4 && step.norm() < kSettled) break;
   }
   result.converged = true;
@@ -348,16 +361,18 @@ StemFitResult refine_stem(const std::vector<SlicePoint>& points, const StemFitRe
                           const StemDetectorConfig& config) {
   StemFit start = fit.stem;
   start.rms_m = fit.evidence.scatter_m;
-  const NoisyCylinderConfig usual;
+  NoisyCylinderConfig cylinder;
+  cylinder.stray_reach_m = std::max(cylinder.stray_reach_m, kReachBlurs * config.blur_m);
+  cylinder.most_scatter_m = std::max(cylinder.most_scatter_m, kMostRefinedBlurs * config.blur_m);
   std::vector<SlicePoint> near;
   const StemAxis axis(start);
   for (const SlicePoint& point : points) {
-    if (axis.surface_error(point) < usual.stray_reach_m) near.push_back(point);
+    if (axis.surface_error(point) < cylinder.stray_reach_m) near.push_back(point);
   }
-  NoisyCylinder best = fit_noisy_cylinder(near, start, usual);
+  NoisyCylinder best = fit_noisy_cylinder(near, start, cylinder);
   if (fit.evidence.scatter_m > kThinTryScatter * start.radius_m ||
       fit.evidence.fill < kThinTryFill || fit.evidence.even_arc_deg < kThinTryArc * start.arc_deg) {
-    const NoisyCylinder thin = fit_noisy_cylinder(near, thin_start(near, start), usual);
+    const NoisyCylinder thin = fit_noisy_cylinder(near, thin_start(near, start), cylinder);
     // It must not win by leaving out the half of a stem that was seen in few points.
     if (thin.converged && (!best.converged || (thin.log_likelihood > best.log_likelihood &&
                                                thin.strays < best.strays + kThinStrays)))

@@ -9,6 +9,7 @@
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/slice/shadowed_points.h"
 #include "understory/forest/slice/slice_thinner.h"
+#include "understory/forest/stems/blurred_stems.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/tiles/tile_shelf.h"
 
@@ -72,7 +73,8 @@ class StemTiles {
     harvest.ceiling.settle();
     if (gathered.size() == 1) {
       harvest.slices = slices_.take(0);
-      harvest.stems = detect_stems(harvest.slices, config_, {{}, origin_.head<2>()}, progress_);
+      harvest.stems = detect_stems(harvest.slices, config_, {{}, origin_.head<2>()}, progress_,
+                                   &harvest.blur_m);
       const std::vector<SlicePoint> above = above_.take(0);
       for (const HeightRange& heights : hidden_stem_heights(config_)) {
         std::vector<SlicePoint> points =
@@ -88,16 +90,22 @@ class StemTiles {
       }
       return harvest;
     }
-    for (const StemCut cut : {StemCut::kThin, StemCut::kThick, StemCut::kFoliage})
+    for (const StemCut cut : {StemCut::kThin, StemCut::kThick})
       search_cut(cut, harvest.stems);
+    harvest.blur_m = add_blurred_stems(
+        config_,
+        [&](StemCut cut, const StemDetectorConfig& config) { return find_in_cut(cut, config, {}); },
+        harvest.stems);
+    search_cut(StemCut::kFoliage, harvest.stems);
     for (const HeightRange& heights : hidden_stem_heights(config_)) {
-      search(
-          harvest.stems, shadow_reach_m(), [&](const Nearby& nearby, const StemSearchArea& where) {
-            const std::vector<SlicePoint> above = points_in(above_, cloud_, origin_, nearby.around);
-            std::vector<SlicePoint> points =
-                points_over_shadows(nearby.slices, above, heights.lowest_m, heights.highest_m);
-            return detect_hidden_stems(heights, points, nearby.stems, config_, where, progress_);
-          });
+      const auto find = [&](const Nearby& nearby, const StemSearchArea& where) {
+        const std::vector<SlicePoint> above = points_in(above_, cloud_, origin_, nearby.around);
+        std::vector<SlicePoint> points =
+            points_over_shadows(nearby.slices, above, heights.lowest_m, heights.highest_m);
+        return detect_hidden_stems(heights, points, nearby.stems, config_, where, progress_);
+      };
+      add(find_in_tiles(harvest.stems, stem_search_reach(config_) + shadow_reach_m(), find),
+          harvest.stems);
     }
     if (config_.thin_dbh_m > 0.0) search_cut(StemCut::kThinnest, harvest.stems);
     add_shown(harvest.slices);
@@ -153,30 +161,38 @@ class StemTiles {
     std::vector<StemFit> stems;  // that are known
   };
 
-  // Adds the stems that `find` finds in each tile to those of the searches before. `farther_m`: how
-  // much more around a tile it has to know.
+  // The stems that `find` finds in each tile, in which it is told of the known ones. `reach_m`: how
+  // much around a tile it has to know.
   template <typename Find>
-  void search(std::vector<StemFit>& stems, double farther_m, const Find& find) {
+  std::vector<StemFit> find_in_tiles(const std::vector<StemFit>& known, double reach_m,
+                                     const Find& find) {
     std::vector<std::vector<StemFit>> found(cloud_.tiles().size());
-    const double reach = stem_search_reach(config_) + farther_m;
     for_tiles(cloud_, [&](std::size_t tile) {
       progress_.poll();
       const GroundArea area = local(tile);
-      Nearby nearby{area.grown(reach), {}, {}};
+      Nearby nearby{area.grown(reach_m), {}, {}};
       nearby.slices = points_in(slices_, cloud_, origin_, nearby.around);
-      for (const StemFit& stem : stems) {
+      for (const StemFit& stem : known) {
         if (nearby.around.contains(stem.centre)) nearby.stems.push_back(stem);
       }
       found[tile] = find(std::move(nearby), {area, origin_.head<2>()});
     });
+    std::vector<StemFit> all;
     for (std::vector<StemFit>& part : found)
-      add(std::move(part), stems);
+      add(std::move(part), all);
+    return all;
+  }
+
+  std::vector<StemFit> find_in_cut(StemCut cut, const StemDetectorConfig& config,
+                                   const std::vector<StemFit>& known) {
+    return find_in_tiles(
+        known, stem_search_reach(config), [&](Nearby nearby, const StemSearchArea& where) {
+          return detect_stems_in_cut(cut, nearby.slices, nearby.stems, config, where, progress_);
+        });
   }
 
   void search_cut(StemCut cut, std::vector<StemFit>& stems) {
-    search(stems, 0.0, [&](Nearby nearby, const StemSearchArea& where) {
-      return detect_stems_in_cut(cut, nearby.slices, nearby.stems, config_, where, progress_);
-    });
+    add(find_in_cut(cut, config_, stems), stems);
   }
 
   static void add(std::vector<StemFit> found, std::vector<StemFit>& stems) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <iterator>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "understory/forest/inventory.h"
@@ -227,6 +228,21 @@ TEST(TiledInventory, TheSameTreesWhateverTheTilesAre) {
     expect_same(whole, tiled);
     EXPECT_EQ(labels, labels_of(tiled, &tiles));
     backwards = !backwards;
+  }
+}
+
+TEST(TiledInventory, ABlurredCloudHasTheSameTreesWhateverTheTilesAre) {
+  Random random(13);
+  Cloud cloud = strip_of_stems();
+  for (Eigen::Vector3d& point : cloud)
+    point += 0.03 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+  const InventoryResult whole = take_inventory(blocks_of(cloud), basic_inventory());
+  const auto said = [](const std::string& remark) { return remark.starts_with("The cloud is bl"); };
+  EXPECT_EQ(std::count_if(whole.remarks.begin(), whole.remarks.end(), said), 1);
+  EXPECT_GE(whole.trees.size(), 20U);
+  for (const double tile_m : {50.0, 20.3}) {
+    SCOPED_TRACE(::testing::Message() << tile_m);
+    expect_same(whole, take_inventory(SortedCloud(cloud, tile_m, false, false), basic_inventory()));
   }
 }
 

@@ -155,7 +155,7 @@ void judge(LidarImuOutcome& outcome, const MappedCalibration& found) {
                     fmt::join(rough, ", ")));
   if (!found.alone_because.empty())
     outcome.reasons.push_back(
-        "the values rest on the path of the lidar alone and are about half as exact: " +
+        "the values rest on the path of the lidar alone and are less exact: " +
         found.alone_because);
   if (!outcome.reasons.empty()) outcome.status = RunStatus::kPartial;
   if (found.path.doubts.empty()) return;

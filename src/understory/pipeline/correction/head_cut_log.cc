@@ -50,11 +50,12 @@ std::vector<CutTree> trees_of_cuts(const FelledStand& stand, const std::vector<H
   const auto without = static_cast<std::size_t>(std::count_if(
       matched.begin(), matched.end(), [](const CutTree& cut) { return cut.tree < 0; }));
   if (matched.size() < kFewestCuts || 2 * without <= matched.size()) return matched;
-  log.warn("felling.head_place",
-           fmt::format("{} of {} cuts of the head lie at no tree, so the log is not used. The log "
-                       "and the path do not share one body frame or one clock: check the "
-                       "extrinsics of the lidar (--extrinsics FILE)",
-                       without, matched.size()));
+  log.warn(
+      "felling.head_place",
+      fmt::format("{} of {} cuts of the head lie at no tree, so no tree gets a cut from the log. "
+                  "The log and the path do not share one body frame or one clock: check "
+                  "the extrinsics of the lidar (--extrinsics FILE)",
+                  without, matched.size()));
   return std::vector<CutTree>(matched.size());
 }
 
