@@ -235,7 +235,7 @@ TEST(TiledInventory, ABlurredCloudHasTheSameTreesWhateverTheTilesAre) {
   Random random(13);
   Cloud cloud = strip_of_stems();
   for (Eigen::Vector3d& point : cloud)
-    point += 0.03 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    point += 0.04 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
   const InventoryResult whole = take_inventory(blocks_of(cloud), basic_inventory());
   const auto said = [](const std::string& remark) { return remark.starts_with("The cloud is bl"); };
   EXPECT_EQ(std::count_if(whole.remarks.begin(), whole.remarks.end(), said), 1);
