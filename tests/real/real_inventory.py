@@ -10,7 +10,6 @@ hold them that are not the program's list:
 """
 
 import csv
-import json
 import os
 import subprocess
 import sys
@@ -150,21 +149,26 @@ def check_halves(cloud, folder):
     assert len(both) >= 14 and places < 0.04 and diameters < 0.015
 
 
-def check_blurred(folder, places):
-    """The mobile cloud with 4 cm of noise added. Bug: 12 of its 27 stems were found, and nothing was said."""
-    las = laspy.read(MOBILE)
-    points = np.array(las.xyz)
+def blurred(cloud, folder):
+    """Trees of a cloud with 4 cm of noise added. The report has to say that it is blurred."""
+    points = np.array(laspy.read(cloud).xyz)
     header = laspy.LasHeader(point_format=0, version="1.2")
     header.scales, header.offsets = [0.001] * 3, np.floor(points.min(axis=0))
-    cloud = laspy.LasData(header)
-    cloud.xyz = points + np.random.default_rng(4).normal(0.0, 0.04, points.shape)
-    cloud.write(str(folder / "blurred.laz"))
-    trees = inventory(folder / "blurred.laz", folder)
+    noisy = laspy.LasData(header)
+    noisy.xyz = points + np.random.default_rng(4).normal(0.0, 0.04, points.shape)
+    noisy.write(str(folder / f"noisy_{cloud.stem}.laz"))
+    trees = inventory(folder / f"noisy_{cloud.stem}.laz", folder)
+    assert "The cloud is blurred" in (folder / f"run_noisy_{cloud.stem}" / "run.json").read_text(encoding="utf-8")
+    return trees
+
+
+def check_blurred(folder, places):
+    """Bug: 12 of the 27 stems of the mobile cloud were found, and nothing was said."""
+    trees = blurred(MOBILE, folder)
     found = pairs(trees, places)
-    remarks = json.loads((folder / "run_blurred" / "run.json").read_text(encoding="utf-8"))
     print(f"blurred by 4 cm: {len(found)} of {len(places)} stems, {len(trees) - len(found)} others")
     assert len(found) >= 24 and len(trees) - len(found) <= 2
-    assert "The cloud is blurred" in json.dumps(remarks)
+    blurred(FLOWN, folder)  # what crowns alone show of it does not keep the word back
 
 
 def check_diameters(mobile, flown):

@@ -244,6 +244,7 @@ void remark_on_stems(const StemHarvest& gathered, const InventoryConfig& config,
   const std::uint64_t returns = gathered.near_breast;
   const double near_breast = static_cast<double>(returns) / area_m2;
   const std::size_t by_crown = result.trees.size() - result.stems.size();
+  if (gathered.blur_m > 0.0) result.remarks.push_back(blur_remark(gathered.blur_m));
   if (by_crown > 0)
     result.remarks.push_back(fmt::format(
         "{} trees were found by their crowns alone ({:.1f} returns per square metre lie between {} "
@@ -263,7 +264,6 @@ void remark_on_stems(const StemHarvest& gathered, const InventoryConfig& config,
         "and canopy models are not affected.",
         near_breast, config.stems.lowest_m, config.stems.highest_m, per_m2));
   }
-  if (gathered.blur_m > 0.0) result.remarks.push_back(blur_remark(gathered.blur_m));
 }
 
 void remark(const StemHarvest& gathered, const InventoryConfig& config, InventoryResult& result) {
