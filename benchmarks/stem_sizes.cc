@@ -4,8 +4,8 @@
 //   stem_sizes gather SENSOR TRUTH FILE RUN   the same of RUN/map.laz, by the run's own path
 //   stem_sizes fit FILE [FILE ...]            fits them; prints a table (CSV), a row for each stem
 // TRUTH is the folder of `understory simulate --set truth.points=true`, SENSOR a name of the
-// setting beam.sensor ("unknown": no footprints). RUN is of `understory map` with
-// georeference.enabled=false; the true trees are laid on its list. Stems within 30 m of the true
+// setting beam.sensor ("unknown": no footprints). RUN is of `understory map`; the
+// true trees are laid on its list. Stems within 30 m of the true
 // path are taken that stand within 0.5 m of a true tree. benchmarks/stem_sizes.py fits the
 // constants of diameter_sd_m and of excess_radius_m.
 #include <algorithm>
@@ -24,10 +24,11 @@
 #include "understory/forest/ground/ground.h"
 #include "understory/forest/slice/slice_thinner.h"
 #include "understory/forest/stems/beam_footprint.h"
-#include "understory/forest/stems/breast_height_sections.h"
+#include "understory/forest/stems/range_noise.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/stems/stem_detector.h"
 #include "understory/forest/stems/stem_fit.h"
+#include "understory/pipeline/georeferencing/run_place.h"
 #include "understory/recording/clouds/cloud_file.h"
 #include "understory/util/error.h"
 #include "understory/util/log.h"
@@ -118,6 +119,11 @@ KnownCloud read_known_cloud(const std::string& truth, const std::string& run) {
   known.cloud = read_cloud(run.empty() ? truth + "/points.laz" : run + "/map.laz", log);
   known.trees = read_trees(truth + "/trees.csv");
   if (!run.empty()) {
+    const LayerFrame layers = read_layer_frame(run);
+    const Eigen::Vector3d origin = known.cloud.origin;
+    known.cloud.origin = layers.to_world(origin);
+    for (Eigen::Vector3f& point : known.cloud.points)
+      point = (layers.to_world(origin + point.cast<double>()) - known.cloud.origin).cast<float>();
     const auto run_from_truth =
         align_trees(known.trees, read_trees(run + "/trees.csv"), Alignment::kYaw, kSameM);
     if (!run_from_truth) throw InputError(run, "", "expected trees that match those of the truth");
@@ -156,6 +162,7 @@ void gather(LidarSensor sensor, const std::string& truth, const std::string& out
 struct FittedStem {
   Kept kept;
   StemFitResult fit;
+  std::vector<SlicePoint> near;
 };
 
 std::vector<FittedStem> fitted_stems(const std::string& path) {
@@ -176,29 +183,41 @@ std::vector<FittedStem> fitted_stems(const std::string& path) {
     if (!first.converged) continue;
     StemFitResult last = refine_stem(near, first, config);
     if (!last.converged) continue;
-    last.stem.radius_m = radius_with_sections(near, last.stem);
-    stems.push_back({kept, std::move(last)});
+    stems.push_back({kept, std::move(last), std::move(near)});
   }
   return stems;
 }
 
+// Measures them as an inventory does, and gives the noise along the beams.
+double measure(std::vector<FittedStem>& stems) {
+  std::vector<StemFit> all;
+  for (const FittedStem& stem : stems)
+    all.push_back(stem.fit.stem);
+  std::vector<RangeNoiseFits> told;
+  for (const std::size_t i : stems_for_range_noise(all)) {
+    if (const auto fits = fit_range_noise(stems[i].near, all[i])) told.push_back(*fits);
+  }
+  const double noise = range_noise_of(told);
+  for (FittedStem& stem : stems) {
+    measure_at_breast_height(stem.near, noise, stem.fit.stem);
+    stem.fit.stem.radius_m = stem.fit.stem.section_radius_m;
+  }
+  return noise;
+}
+
 void fit(const std::string& path) {
-  const std::vector<FittedStem> stems = fitted_stems(path);
-  std::vector<StemScatter> scatters;
-  for (const auto& [kept, last] : stems)
-    scatters.push_back({kept.range_m, last.stem.radius_m, last.stem.scatter_m});
-  const double noise = range_noise_m(scatters);
-  for (const auto& [kept, last] : stems) {
+  std::vector<FittedStem> stems = fitted_stems(path);
+  const double noise = measure(stems);
+  for (const auto& [kept, last, near] : stems) {
     const StemFit& stem = last.stem;
     BeamConfig beams;
     beams.sensor = static_cast<LidarSensor>(kept.sensor);
-    BeamFootprint beam = footprint_at(beams, kept.range_m);
-    beam.noise_m = noise;
-    const double excess = excess_radius_m(beam, stem.radius_m, stem.arc_deg, stem.scatter_m);
+    const BeamFootprint beam = footprint_at(beams, kept.range_m);
+    const double excess = excess_radius_m(beam, stem.radius_m, stem.arc_deg);
     std::printf("%s,%d,%.3f,%.3f,%.5f,%.5f,%.5f,%.6f,%.1f,%d,%.5f,%.4f,%.5f,%.5f,%.5f\n",
                 std::filesystem::path(path).stem().c_str(), kept.sensor, kept.path_m, kept.range_m,
                 kept.true_dbh_m, 2.0 * stem.radius_m, 2.0 * excess, stem.spread_m, stem.arc_deg,
-                stem.returns, last.evidence.scatter_m, beam.signal > 0.0 ? 1.0 / beam.signal : 0.0,
+                stem.returns, stem.scatter_m, beam.signal > 0.0 ? 1.0 / beam.signal : 0.0,
                 beam.sd_m, excess_width_m(beam, stem.radius_m), noise);
   }
 }

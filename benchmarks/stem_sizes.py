@@ -72,17 +72,16 @@ def beam_terms(rows):
     rows = rows[(rows["beam_m"] > 0) & (np.abs(rows["dbh_m"] - rows["true_m"]) < 0.12)]
     radius = 0.5 * rows["dbh_m"]
     one_sided = np.maximum(0, 1 - rows["arc_deg"] / 360)
-    noise = np.where(rows["noise_m"] > 0, rows["noise_m"], rows["scatter_m"])
     terms = np.stack([one_sided * rows["width_m"], rows["beam_m"],
-                      -rows["beam_m"] * rows["scatter_m"] / np.maximum(radius, THIN_RADIUS), -one_sided * noise], 1)
+                      -rows["beam_m"] ** 2 / np.maximum(radius, THIN_RADIUS)], 1)
     return rows, terms, radius - 0.5 * rows["true_m"]
 
 
 def beam_constants(rows, terms, excess):
-    """kOneSided, kAllSides, kScatter and kNoise of excess_radius_m by robust least squares (Huber)."""
+    """kOneSided, kAllSides and kBesideStem of excess_radius_m by robust least squares (Huber)."""
     sds = np.sqrt((1.4 * rows["spread_m"]) ** 2 + 0.004 ** 2 + (1.5e-5 * rows["range_m"] ** 2) ** 2)
     _, cloud, number = np.unique(rows["cloud"], return_inverse=True, return_counts=True)
-    found = np.zeros(4)
+    found = np.zeros(3)
     for _ in range(30):
         ratio = np.abs(excess - terms @ found) / sds
         weights = np.sqrt(np.minimum(1, 1.5 / np.maximum(ratio, 1e-9)) / sds ** 2 / np.sqrt(number[cloud]))
@@ -93,7 +92,7 @@ def beam_constants(rows, terms, excess):
 def fit_radius(rows):
     rows, terms, excess = beam_terms(rows)
     found = beam_constants(rows, terms, excess)
-    print(f"excess_radius_m: kOneSided {found[0]:.2f}, kAllSides {found[1]:.2f}, kScatter {found[2]:.2f}, kNoise {found[3]:.2f}, from {len(rows)} stems")
+    print(f"excess_radius_m: kOneSided {found[0]:.2f}, kAllSides {found[1]:.2f}, kBesideStem {found[2]:.2f}, from {len(rows)} stems")
 
 
 def leave_out(rows):

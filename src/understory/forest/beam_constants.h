@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstddef>
-
 // Numbers of forest/stems/beam_footprint.cc that are no settings. What the words in brackets mean:
 // stem_constants.h.
 namespace understory::beam_constants {
@@ -14,25 +12,16 @@ inline constexpr double kLeastCosine = 0.08;
 inline constexpr double kLeastPart = 0.1;
 // Share of the excess of the width that the radius of a stem has which was seen from one side. At
 // half a circumference it is half of that. [tuned on maps of `random` by the program's own path,
-// with the next two and kNoise. Seeds: docs/method/forest-experiments.md, the noise of the ranges]
-inline constexpr double kOneSided = 1.46;
+// with the next two. Seeds: docs/method/forest-experiments.md, the noise of the ranges]
+inline constexpr double kOneSided = 0.92;
 // Standard deviations of a beam that the radius grows by from whichever side it was seen
 // [tuned likewise]
-inline constexpr double kAllSides = 0.79;
-// The same, times the scatter over the radius, by which the fit makes it too small [tuned
+inline constexpr double kAllSides = 0.51;
+// The same, times that of the beam over the radius, by which the fit makes it too small [tuned
 // likewise]
-inline constexpr double kScatter = 2.37;
+inline constexpr double kBesideStem = 1.10;
 // m: of thinner stems it does so as of one of this radius [chosen with them]
 inline constexpr double kThinRadius = 0.03;
-// Of the noise of the ranges, what a radius seen from one side is too small by [tuned likewise]
-inline constexpr double kNoise = 1.54;
-// m: stems nearer than this show that noise; farther ones the width of the beams [chosen: at 12 m
-// an OS0 has a quarter width of 18 mm]
-inline constexpr double kNoiseRange = 12.0;
-// m: radius of a stem at least that shows it [chosen: twice the noise that lidars have at most]
-inline constexpr double kNoiseRadius = 0.04;
-// Stems at least that show it [chosen]
-inline constexpr std::size_t kFewestNoisy = 5;
 // Radii: a correction is no larger [chosen]
 inline constexpr double kMostShare = 0.4;
 // Standard deviation of a diameter. Of a stem whose beams are compensated: times the spread of the

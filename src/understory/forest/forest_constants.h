@@ -447,6 +447,9 @@ inline constexpr std::size_t kMostPoints = 60'000;
 namespace stem_tiles {  // forest/tiles/stem_tiles.cc
 // m beyond a tile: cubes of thinned points that begin in it reach so far [bound: the largest cube]
 inline constexpr double kCubeReach = 0.11;
+// m beyond a tile: points that a stem in it is measured with [bound: the thickest stem, what is
+// looked at around it, and a lean]
+inline constexpr double kMeasuredBeyond = 2.5;
 // m from breast height: points that the report shows [bound: what it draws]
 inline constexpr double kShownReach = 0.65;
 // Thinned points of a cloud in tiles that are kept for the report, at most [bound: memory]

@@ -75,20 +75,13 @@ void take_section_radii(InventoryResult& result) {
 // Takes away what wide beams add to the radii, and says how sure these are.
 void compensate_beams(const BeamConfig& config, const std::vector<Eigen::Vector3d>& scanner,
                       InventoryResult& result) {
-  std::vector<StemScatter> scatters;
-  for (const StemFit& stem : result.stems) {
+  for (StemFit& stem : result.stems) {
     Eigen::Vector3d place = result.origin;
     place.head<2>() += stem.centre;
     place.z() = result.ground.terrain.interpolate(place.x(), place.y()) + kBreastHeight;
-    scatters.push_back({mean_range_to(scanner, place), stem.radius_m, stem.scatter_m});
-  }
-  const double noise = range_noise_m(scatters);
-  for (std::size_t i = 0; i < result.stems.size(); ++i) {
-    StemFit& stem = result.stems[i];
-    const double range = scatters[i].range_m;
+    const double range = mean_range_to(scanner, place);
     stem.beam = footprint_at(config, range);
-    stem.beam.noise_m = noise;
-    stem.beam_excess_m = excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg, stem.scatter_m);
+    stem.beam_excess_m = excess_radius_m(stem.beam, stem.radius_m, stem.arc_deg);
     stem.radius_m -= stem.beam_excess_m;
     const double sd = diameter_sd_m(stem.spread_m, stem.arc_deg, range, stem.beam);
     const double foliage_sd_m = stem.in_foliage ? kFoliageRadiusSd : 0.0;
@@ -244,7 +237,8 @@ void remark_on_stems(const StemHarvest& gathered, const InventoryConfig& config,
   const std::uint64_t returns = gathered.near_breast;
   const double near_breast = static_cast<double>(returns) / area_m2;
   const std::size_t by_crown = result.trees.size() - result.stems.size();
-  if (gathered.blur_m > 0.0) result.remarks.push_back(blur_remark(gathered.blur_m));
+  if (gathered.blur_m > 0.0)
+    result.remarks.push_back(blur_remark(gathered.blur_m, gathered.range_noise_m));
   if (by_crown > 0)
     result.remarks.push_back(fmt::format(
         "{} trees were found by their crowns alone ({:.1f} returns per square metre lie between {} "

@@ -353,6 +353,13 @@ inline constexpr double kSettled = 4e-5;
 inline constexpr double kMostStretch = 6.0;
 // Scatters between places on the circumference: the scatter blurs the gaps [probed: no figure]
 inline constexpr double kBinScatters = 0.8;
+// The same where noise lies along the beams [bound: a sum of Gaussians so far apart is even to
+// 1e-5]
+inline constexpr double kNoisyBinScatters = 1.3;
+// m: noise along the beams that a fit finds, at least [bound: rounding]
+inline constexpr double kLeastRangeNoise = 0.001;
+// m: the same at most [bound: scanners]
+inline constexpr double kMostRangeNoise = 0.1;
 // Places on the circumference at least [probed: no figure]
 inline constexpr double kFewestBins = 24.0;
 // Places on the circumference at most [bound: time]

@@ -209,7 +209,6 @@ inline constexpr double kLeastTop = 2.0;
 namespace breast_height_sections {  // forest/stems/breast_height_sections.cc
 // The sections are those of a stem curve.
 using stem_curve::kFewestPoints;
-using stem_curve::kFitReach;
 using stem_curve::kHalfWindow;
 using stem_curve::kLinear;
 using stem_curve::kMostChange;

@@ -11,6 +11,7 @@
 #include "understory/forest/form/stem_fork.h"
 #include "understory/forest/stem_curve_constants.h"
 #include "understory/forest/stems/noisy_cylinder.h"
+#include "understory/forest/stems/range_noise.h"
 #include "understory/forest/stems/section_evidence.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/util/median.h"
@@ -34,7 +35,10 @@ struct FittedSection {
 class Tracker {
  public:
   Tracker(const std::vector<SlicePoint>& points, const StemFit& stem)
-      : points_(points), stem_(stem) {}
+      : points_(points), stem_(stem) {
+    form_.range_noise_m = stem.range_noise_m;
+    form_.stray_reach_m = fit_reach_m(stem.range_noise_m);
+  }
 
   // Sections away from breast height, in steps of `step_m` (negative: downwards) until `end_m`.
   void follow(double step_m, double end_m, std::vector<FittedSection>& rings) {
@@ -71,7 +75,7 @@ class Tracker {
   std::vector<SlicePoint> window(const FittedSection& guess, const Eigen::Vector2d& slope) const {
     const auto low = static_cast<float>(guess.height_m - kHalfWindow);
     const auto high = static_cast<float>(guess.height_m + kHalfWindow);
-    const double reach = guess.radius_m + kFitReach;
+    const double reach = guess.radius_m + fit_reach_m(stem_.range_noise_m);
     std::vector<SlicePoint> near;
     auto at = std::lower_bound(points_.begin(), points_.end(), low,
                                [](const SlicePoint& p, float h) { return p.height_m < h; });
@@ -95,7 +99,7 @@ class Tracker {
     start.radius_m = guess.radius_m;
     start.taper = kUsualTaper;
     start.rms_m = stem_.rms_m;
-    const NoisyCylinder found = fit_noisy_cylinder(near, start, kForm);
+    const NoisyCylinder found = fit_noisy_cylinder(near, start, form_);
     if (!found.converged || found.strays > kMostStrays) return std::nullopt;
     const double spread = std::sqrt(std::max(1e-12, found.covariance(4, 4)));
     const double sd = std::sqrt(std::pow(kLinear * spread, 2) +
@@ -126,7 +130,7 @@ class Tracker {
     return FittedSection{guess.height_m, found.centre, found.radius_m, sd, seen_deg};
   }
 
-  static constexpr NoisyCylinderConfig kForm{};
+  NoisyCylinderConfig form_;
   const std::vector<SlicePoint>& points_;
   const StemFit& stem_;
 };
@@ -353,7 +357,7 @@ std::vector<FittedSection> sections_of(const std::vector<SlicePoint>& points, co
   tracker.follow(kStep, top_m - kStep, above);
   for (std::vector<FittedSection>* part : {&rings, &above}) {
     for (FittedSection& ring : *part)
-      ring.radius_m -= excess_radius_m(stem.beam, ring.radius_m, ring.seen_deg, stem.scatter_m);
+      ring.radius_m -= excess_radius_m(stem.beam, ring.radius_m, ring.seen_deg);
   }
   const double offset = offset_at_breast_height(stem, rings, above);
   for (std::vector<FittedSection>* part : {&rings, &above}) {

@@ -126,7 +126,7 @@ TEST(StemCurve, WhatWideBeamsAddIsTakenAwayAlongTheStem) {
   const auto added = [&](double radius) {
     double sum = 0.0;
     for (int i = 0; i < 20; ++i)
-      sum = excess_radius_m(fit.beam, radius + sum, fit.arc_deg, 0.0);
+      sum = excess_radius_m(fit.beam, radius + sum, fit.arc_deg);
     return sum;
   };
   fit.beam_excess_m = added(fit.radius_m);

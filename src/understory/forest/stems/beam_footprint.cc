@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "understory/forest/beam_constants.h"
-#include "understory/util/median.h"
 
 namespace understory {
 namespace {
@@ -145,23 +144,12 @@ double diameter_sd_m(double spread_m, double arc_deg, double range_m, const Beam
                     kWideOneSided * one_sided * tens);
 }
 
-double range_noise_m(const std::vector<StemScatter>& stems) {
-  std::vector<double> scatters;
-  for (const StemScatter& stem : stems) {
-    if (stem.range_m > 0.0 && stem.range_m < kNoiseRange && stem.radius_m > kNoiseRadius)
-      scatters.push_back(stem.scatter_m);
-  }
-  return scatters.size() < kFewestNoisy ? 0.0 : upper_median(std::move(scatters));
-}
-
-double excess_radius_m(const BeamFootprint& beam, double radius_m, double arc_deg,
-                       double scatter_m) {
+double excess_radius_m(const BeamFootprint& beam, double radius_m, double arc_deg) {
   if (!(beam.sd_m > 0.0) || !(radius_m > 0.0)) return 0.0;
   const double one_sided = std::max(0.0, 1.0 - arc_deg / 360.0);
-  const double noise = beam.noise_m > 0.0 ? beam.noise_m : scatter_m;
-  const double all_sides = kAllSides - kScatter * scatter_m / std::max(radius_m, kThinRadius);
-  const double excess = one_sided * (kOneSided * excess_width_m(beam, radius_m) - kNoise * noise) +
-                        all_sides * beam.sd_m;
+  const double all_sides = kAllSides - kBesideStem * beam.sd_m / std::max(radius_m, kThinRadius);
+  const double excess =
+      one_sided * kOneSided * excess_width_m(beam, radius_m) + all_sides * beam.sd_m;
   return std::clamp(excess, -kMostShare * radius_m, kMostShare * radius_m);
 }
 

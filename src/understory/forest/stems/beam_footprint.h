@@ -32,9 +32,8 @@ void describe(ConfigTable& table, BeamConfig& config);
 
 // The beams that met a stem.
 struct BeamFootprint {
-  double sd_m = 0.0;     // a quarter of their width there; 0: nothing is known of them
-  double signal = 0.0;   // a whole beam square on bark over the weakest echo that is told
-  double noise_m = 0.0;  // standard deviation of the ranges, see range_noise_m; 0: not known
+  double sd_m = 0.0;    // a quarter of their width there; 0: nothing is known of them
+  double signal = 0.0;  // a whole beam square on bark over the weakest echo that is told
 };
 // Of beams that come from `range_m` away; nothing where the range or the beams are not known (0).
 [[nodiscard]] BeamFootprint footprint_at(const BeamConfig& config, double range_m);
@@ -63,24 +62,10 @@ struct BeamFootprint {
 [[nodiscard]] double diameter_sd_m(double spread_m, double arc_deg, double range_m,
                                    const BeamFootprint& beam);
 
-// What a stem tells of the noise of the lidar's ranges.
-struct StemScatter {
-  double range_m = 0.0;  // from where it was seen on average
-  double radius_m = 0.0;
-  double scatter_m = 0.0;  // of the points about its surface (NoisyCylinder::scatter_m)
-};
-// The noise of the lidar's ranges as its stems show it, metres: the median scatter of those that
-// are near and thick enough. Others scatter by the width of the beams. 0 where these are too few.
-[[nodiscard]] double range_noise_m(const std::vector<StemScatter>& stems);
-
 // By how much a fit of `arc_deg` of the circumference makes a radius too large for that, metres.
 // Negative where it makes it too small, 0 where the beams are not known. The whole excess counts
 // where a stem was seen from one side, and a part of the beam where it was seen all around. Of that
-// the fit itself removes the more, the larger `scatter_m` is beside the radius: that of the points
-// about the surface (NoisyCylinder::scatter_m). Noise of the ranges makes the radius smaller still
-// where it was seen from one side: the fit takes it for scatter in each direction. Where that noise
-// is not known, `scatter_m` stands for it.
-[[nodiscard]] double excess_radius_m(const BeamFootprint& beam, double radius_m, double arc_deg,
-                                     double scatter_m);
+// the fit itself removes the more, the wider the beam is beside the stem.
+[[nodiscard]] double excess_radius_m(const BeamFootprint& beam, double radius_m, double arc_deg);
 
 }  // namespace understory

@@ -33,7 +33,8 @@ using CutSearch =
 double add_blurred_stems(const StemDetectorConfig& config, const CutSearch& search,
                          std::vector<StemFit>& stems);
 
-// What a user has to know of a blurred cloud, as a sentence or two. `blur_m`: as of blur_of.
-[[nodiscard]] std::string blur_remark(double blur_m);
+// What a user has to know of a blurred cloud, in a few sentences. `blur_m`: as of blur_of;
+// `range_noise_m`: as of range_noise_of.
+[[nodiscard]] std::string blur_remark(double blur_m, double range_noise_m);
 
 }  // namespace understory

@@ -5,6 +5,7 @@
 
 #include "understory/forest/stem_curve_constants.h"
 #include "understory/forest/stems/noisy_cylinder.h"
+#include "understory/forest/stems/range_noise.h"
 #include "understory/forest/stems/section_evidence.h"
 #include "understory/forest/stems/stem_axis.h"
 
@@ -16,12 +17,13 @@ using namespace stem_constants::breast_height_sections;
 // The points of a section, with its height as breast height.
 std::vector<SlicePoint> points_of(const std::vector<SlicePoint>& points, const StemFit& stem,
                                   double rise_m) {
+  const double reach = fit_reach_m(stem.range_noise_m);
   std::vector<SlicePoint> section;
   const StemAxis axis(stem);
   for (const SlicePoint& point : points) {
     const double height = static_cast<double>(point.height_m) - rise_m;
     if (std::abs(height - kBreastHeight) > kHalfWindow) continue;
-    if (std::abs(axis.surface_error(point)) > kFitReach) continue;
+    if (std::abs(axis.surface_error(point)) > reach) continue;
     SlicePoint moved = point;
     moved.height_m = static_cast<float>(height);
     section.push_back(moved);
@@ -44,6 +46,9 @@ double radius_with_sections(const std::vector<SlicePoint>& points, const StemFit
   double weights = 0.0;
   double sum = 0.0;
   int sections = 0;
+  NoisyCylinderConfig config;
+  config.range_noise_m = stem.range_noise_m;
+  config.stray_reach_m = fit_reach_m(stem.range_noise_m);
   for (int k = -kSectionsBeside; k <= kSectionsBeside; ++k) {
     const double rise = k * kStep;
     const std::vector<SlicePoint> near = points_of(points, stem, rise);
@@ -52,7 +57,7 @@ double radius_with_sections(const std::vector<SlicePoint>& points, const StemFit
     start.centre += rise * stem.slope;
     start.radius_m += rise * stem.taper;
     start.taper = kUsualTaper;
-    const NoisyCylinder found = fit_noisy_cylinder(near, start, {});
+    const NoisyCylinder found = fit_noisy_cylinder(near, start, config);
     if (!found.converged || found.strays > kMostStrays) continue;
     const double shift = (found.centre - start.centre).norm();
     const double change = std::abs(found.radius_m - start.radius_m);

@@ -2,11 +2,12 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cmath>
-#include <cstdint>
+#include <cstddef>
 
 #include "understory/forest/stem_constants.h"
+#include "understory/forest/stems/places_on_circle.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/geometry/symmetric_solver.h"
 
@@ -18,40 +19,50 @@ using namespace stem_constants::noisy_cylinder;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-// Places on the circumference are taken so many at once.
-constexpr Eigen::Index kTogether = 4;
-using Places = Eigen::Array<double, kTogether, 1>;
+// What noise along the beams makes of the places on the circumference, twice round. A place's beams
+// have a mean direction and a spread; of both the second moments count.
+class PlaceTable {
+ public:
+  // Of the precision (inverse of the covariance) the parts; these times the outward direction, and
+  // on either side; the root of its determinant.
+  enum class Column { kXx, kXy, kYy, kOutwardX, kOutwardY, kOutward, kWeight };
+  static constexpr int kColumns = 6;  // that are summed up
 
-// exp(x) for x <= 0 to nine digits, a quarter of the library's time: the fit is made of these.
-Places quick_exp(const Places& x) {
-  constexpr double kLog2e = 1.4426950408889634;
-  constexpr double kLn2 = 0.6931471805599453;
-  constexpr double kToBits = 0x1.8p52;  // its last bits count ones
-  constexpr double kLeast = -60.0;      // a chance of 1e-26 counts as none
-  const Places whole = (x * kLog2e + kToBits) - kToBits;
-  const Places rest = x - whole * kLn2;  // at most 0.35
-  Places sum = Places::Constant(1.0 / 40320.0);
-  for (const double term :
-       {1.0 / 5040.0, 1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0})
-    sum = sum * rest + term;
-  const Places bits = whole + kToBits;
-  Places power;
-  for (Eigen::Index i = 0; i < kTogether; ++i)
-    power[i] = std::bit_cast<double>((std::bit_cast<std::uint64_t>(bits[i]) + 1023) << 52);
-  return (x >= kLeast).select(sum * power, 0.0);
-}
+  // `lobes`: what each direction (column) sees of each place (row). `views`: how much of all comes
+  // from it. The standard deviations are metres, to all sides and along the beams.
+  void fill(const Eigen::MatrixXd& lobes, const Eigen::VectorXd& views, double scatter,
+            double range_noise) {
+    const Eigen::Index count = lobes.rows();
+    const Eigen::Index directions = lobes.cols();
+    Eigen::MatrixXd moments(directions, 4);
+    for (Eigen::Index k = 0; k < directions; ++k) {
+      const double turn = 2.0 * M_PI * static_cast<double>(k) / static_cast<double>(directions);
+      const Eigen::Vector2d view(std::cos(turn), std::sin(turn));
+      moments.row(k) << view.x() * view.x(), view.x() * view.y(), view.y() * view.y(), 1.0;
+    }
+    const Eigen::MatrixXd seen = lobes * views.asDiagonal() * moments;
+    values_.setZero(2 * count + kTogether, kColumns + 1);
+    for (Eigen::Index b = 0; b < count; ++b) {
+      const double turn = 2.0 * M_PI * (static_cast<double>(b) + 0.5) / static_cast<double>(count);
+      const Eigen::Vector2d outward(std::cos(turn), std::sin(turn));
+      const double noise = range_noise * range_noise / seen(b, 3);
+      Eigen::Matrix2d covariance;
+      covariance << seen(b, 0), seen(b, 1), seen(b, 1), seen(b, 2);
+      covariance = noise * covariance + scatter * scatter * Eigen::Matrix2d::Identity();
+      const Eigen::Matrix2d precision = covariance.inverse();
+      const Eigen::Vector2d out = precision * outward;
+      values_.row(b) << precision(0, 0), precision(0, 1), precision(1, 1), out.x(), out.y(),
+          outward.dot(out), std::sqrt(precision.determinant());
+      values_.row(b + count) = values_.row(b);
+    }
+  }
+  [[nodiscard]] auto at(Column column, Eigen::Index place) const {
+    return values_.col(static_cast<Eigen::Index>(column)).segment<kTogether>(place);
+  }
 
-// The direction of (x, y) as a share of a turn, 0 to 1. At most 0.001 off: a sixth of the smallest
-// distance between places.
-double rough_turn(double x, double y) {
-  const double along = std::abs(x);
-  const double across = std::abs(y);
-  const double ratio = std::min(along, across) / std::max({along, across, 1e-12});
-  const double eighth = ratio * (0.9724 - 0.1919 * ratio * ratio) / (2.0 * M_PI);
-  const double quarter = across > along ? 0.25 - eighth : eighth;
-  const double half = x < 0.0 ? 0.5 - quarter : quarter;
-  return y < 0.0 ? 1.0 - half : half;
-}
+ private:
+  Eigen::ArrayXXd values_;
+};
 
 // A point seen along the stem: place in the plane across it, relative to the start's centre line.
 struct FlatPoint {
@@ -85,6 +96,8 @@ class Estimator {
     radius_ = start.radius_m;
     taper_ = start.taper;
     scatter_ = std::clamp(start.rms_m, kFirstScatterLeast, kFirstScatterMost);
+    range_noise_ = config.range_noise_m;
+    if (range_noise_ > 0.0) scatter_ = std::max(kFirstScatterLeast, scatter_ - range_noise_);
     const double reach = radius_ + config.stray_reach_m;
     stray_density_ = 1.0 / (M_PI * reach * reach);
   }
@@ -109,6 +122,7 @@ class Estimator {
     result.radius_m = radius_;
     result.taper = taper_;
     result.scatter_m = scatter_;
+    result.range_noise_m = range_noise_;
     result.strays = strays_;
     Matrix6 unsqueeze = Matrix6::Identity();
     unsqueeze.topLeftCorner<2, 2>() = back;
@@ -140,7 +154,8 @@ class Estimator {
 
   // Places on the circumference, near enough to each other that the scatter blurs the gaps.
   void spread_bins() {
-    const double wanted = 2.0 * M_PI * radius_ / (kBinScatters * scatter_);
+    const double gap = range_noise_ > 0.0 ? kNoisyBinScatters : kBinScatters;
+    const double wanted = 2.0 * M_PI * radius_ / (gap * scatter_);
     const double quarter = std::clamp(wanted, kFewestBins, kMostBins) / kTogether;
     const auto count = kTogether * static_cast<Eigen::Index>(std::ceil(quarter));
     visible_ = Eigen::ArrayXd::Constant(2 * count + kTogether, 1.0 / static_cast<double>(count));
@@ -170,23 +185,32 @@ class Estimator {
     Vector6 right = Vector6::Zero();
     double weight = 0.0;
     double square = 0.0;
+    double along = 0.0;  // slope of the log likelihood over the noise's variance, twice
     double log_likelihood = 0.0;
   };
+
+  // Places in a row: only those near a point's own angle can have given it.
+  struct Row {
+    Eigen::Index begin;
+    Eigen::Index size;
+  };
+  [[nodiscard]] Row row_near(const Eigen::Vector2d& q, double r, double scatter) const {
+    const Eigen::Index count = lobes_.rows();
+    const double width = kBlurReach * scatter / std::sqrt(std::max(1e-8, r * q.norm()));
+    const auto reach =
+        static_cast<Eigen::Index>(width / (2.0 * M_PI) * static_cast<double>(count)) + 1;
+    const Eigen::Index size = std::min(count, 2 * reach + 1);
+    const auto middle =
+        static_cast<Eigen::Index>(rough_turn(q.x(), q.y()) * static_cast<double>(count));
+    return {(middle + count - size / 2) % count, size};
+  }
 
   // `seen`: of the places twice round, the returns that came from them.
   void add_point(const FlatPoint& point, Sums& sums, Eigen::ArrayXd& seen) {
     const Eigen::Vector2d q = point.place - centre_ - point.rise * slope_;
     const double r = radius_ + taper_ * point.rise;
     const double inverse = 1.0 / (scatter_ * scatter_);
-    // Only places near the point's own angle can have given it.
-    const Eigen::Index count = lobes_.rows();
-    const double width = kBlurReach * scatter_ / std::sqrt(std::max(1e-8, r * q.norm()));
-    const auto reach =
-        static_cast<Eigen::Index>(width / (2.0 * M_PI) * static_cast<double>(count)) + 1;
-    const Eigen::Index near = std::min(count, 2 * reach + 1);
-    const auto middle =
-        static_cast<Eigen::Index>(rough_turn(q.x(), q.y()) * static_cast<double>(count));
-    const Eigen::Index begin = (middle + count - near / 2) % count;
+    const auto [begin, near] = row_near(q, r, scatter_);
     Places density = Places::Zero();
     Places mean_x = Places::Zero();
     Places mean_y = Places::Zero();
@@ -238,14 +262,100 @@ class Estimator {
     sums.right[5] += h * out;
   }
 
+  // The same where noise lies along the beams. A place's Gaussian is longer along the mean
+  // direction of the beams that reach it. Terms of the system are weighted with its precision.
+  void add_noisy_point(const FlatPoint& point, Sums& sums, Eigen::ArrayXd& seen) {
+    const Eigen::Vector2d q = point.place - centre_ - point.rise * slope_;
+    const double r = radius_ + taper_ * point.rise;
+    const auto [begin, near] = row_near(q, r, std::hypot(scatter_, range_noise_));
+    using Column = PlaceTable::Column;
+    std::array<Places, PlaceTable::kColumns> columns;
+    columns.fill(Places::Zero());
+    Places squares = Places::Zero();  // of the precision times the displacement
+    Places distances = Places::Zero();
+    for (Eigen::Index b = 0; b < near; b += kTogether) {
+      const auto at = [&](Column column) { return table_.at(column, begin + b); };
+      const Places x = q.x() - r * outward_x_.segment<kTogether>(begin + b);
+      const Places y = q.y() - r * outward_y_.segment<kTogether>(begin + b);
+      const Places ux = at(Column::kXx) * x + at(Column::kXy) * y;
+      const Places uy = at(Column::kXy) * x + at(Column::kYy) * y;
+      const Places distance = x * ux + y * uy;
+      Places shares =
+          quick_exp(-0.5 * distance) * at(Column::kWeight) * visible_.segment<kTogether>(begin + b);
+      for (Eigen::Index beyond = near - b; beyond < kTogether; ++beyond)
+        shares[beyond] = 0.0;
+      shares_.segment<kTogether>(b) = shares;
+      for (int k = 0; k < PlaceTable::kColumns; ++k)
+        columns[static_cast<std::size_t>(k)] += shares * at(static_cast<Column>(k));
+      squares += shares * (ux.square() + uy.square());
+      distances += shares * distance;
+    }
+    const double density = shares_.head(near).sum();
+    const double scale = (1.0 - strays_) / (2.0 * M_PI);
+    const double all = scale * density + strays_ * stray_density_;
+    const double w = point.weight * scale / all;
+    const auto sum = [&](Column column) {
+      return w * columns[static_cast<std::size_t>(column)].sum();
+    };
+    sums.log_likelihood += point.weight * std::log(all);
+    sums.weight += w * density;
+    // What of a displacement is scatter, and how the likelihood grows with the noise.
+    const double s2 = scatter_ * scatter_;
+    const double square = w * squares.sum();
+    const double trace = sum(Column::kXx) + sum(Column::kYy);
+    sums.square += s2 * s2 * square + 2.0 * s2 * w * density - s2 * s2 * trace;
+    sums.along += w * distances.sum() - s2 * square - 2.0 * w * density + s2 * trace;
+    seen.segment(begin, near) += w * shares_.head(near);
+    Eigen::Matrix2d precision;
+    precision << sum(Column::kXx), sum(Column::kXy), sum(Column::kXy), sum(Column::kYy);
+    const Eigen::Vector2d outward(sum(Column::kOutwardX), sum(Column::kOutwardY));
+    add_to_noisy_system(point, precision, outward, sum(Column::kOutward), sums);
+  }
+
+  // As add_to_system. `precision`: sum of the precisions of the places, each times its weight;
+  // `outward`: of these times the outward directions; `both`: times these on either side.
+  static void add_to_noisy_system(const FlatPoint& point, const Eigen::Matrix2d& precision,
+                                  const Eigen::Vector2d& outward, double both, Sums& sums) {
+    const double h = point.rise;
+    Matrix6& normal = sums.normal;
+    normal.block<2, 2>(0, 0) += precision;
+    normal.block<2, 2>(0, 2) += h * precision;
+    normal.block<2, 2>(2, 2) += h * h * precision;
+    normal.block<2, 1>(0, 4) += outward;
+    normal.block<2, 1>(0, 5) += h * outward;
+    normal.block<2, 1>(2, 4) += h * outward;
+    normal.block<2, 1>(2, 5) += h * h * outward;
+    normal(4, 4) += both;
+    normal(4, 5) += h * both;
+    normal(5, 5) += h * h * both;
+    const Eigen::Vector2d place = precision * point.place;
+    const double out = outward.dot(point.place);
+    sums.right.head<2>() += place;
+    sums.right.segment<2>(2) += h * place;
+    sums.right[4] += out;
+    sums.right[5] += h * out;
+  }
+
+  // One step of scoring for the variance of the noise.
+  void learn_range_noise(const Sums& sums) {
+    const double variance = range_noise_ * range_noise_;
+    const double whole = scatter_ * scatter_ + variance;
+    const double step = whole * whole * sums.along / (variance * sums.weight);
+    range_noise_ =
+        std::clamp(std::sqrt(std::max(0.0, variance + step)), kLeastRangeNoise, kMostRangeNoise);
+  }
+
   bool step(NoisyCylinder& result) {
     Sums sums;
     Eigen::ArrayXd seen = Eigen::ArrayXd::Zero(visible_.size());
+    const bool noisy = range_noise_ > 0.0;
+    if (noisy) table_.fill(lobes_, views_, scatter_, range_noise_);
     for (const FlatPoint& point : flat_)
-      add_point(point, sums, seen);
+      noisy ? add_noisy_point(point, sums, seen) : add_point(point, sums, seen);
     if (sums.weight < std::min(kLeastWeight, 1.0 - config_.most_strays) * total_) return false;
     result.log_likelihood = sums.log_likelihood / total_;
-    const double s2 = scatter_ * scatter_;
+    // Without noise the system is in units of the scatter's variance.
+    const double s2 = noisy ? 1.0 : scatter_ * scatter_;
     const auto prior = [&](int i, double value, double sd) {
       sums.normal(i, i) += s2 / (sd * sd);
       sums.right[i] += s2 / (sd * sd) * value;
@@ -266,6 +376,7 @@ class Estimator {
     result.covariance = s2 * solver.inverse();
     scatter_ = std::clamp(std::sqrt(0.5 * sums.square / sums.weight), kLeastScatter,
                           config_.most_scatter_m);
+    if (noisy && config_.find_range_noise) learn_range_noise(sums);
     strays_ = std::clamp(1.0 - sums.weight / total_, kLeastStrays, config_.most_strays);
     learn_views(seen.head(lobes_.rows()) + seen.segment(lobes_.rows(), lobes_.rows()));
     return true;
@@ -296,6 +407,8 @@ class Estimator {
   double radius_ = 0.0;
   double taper_ = 0.0;
   double scatter_ = 0.0;
+  double range_noise_ = 0.0;  // 0: none beside the scatter
+  PlaceTable table_;          // where there is some
   double strays_ = kFirstStrays;
   double stray_density_ = 1.0;
   // Of the places, twice round: share of the returns that come from each, and its direction.

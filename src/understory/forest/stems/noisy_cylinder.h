@@ -21,6 +21,7 @@ struct NoisyCylinder {
   double radius_m = 0.0;  // at breast height
   double taper = 0.0;
   double scatter_m = 0.0;       // of the points about the surface, in each direction
+  double range_noise_m = 0.0;   // beside it along the beams; 0: it is part of the scatter
   double strays = 0.0;          // share of the returns that belong to something else
   double log_likelihood = 0.0;  // mean over the returns; compares fits to the same points
   // Of centre, slope, radius, taper: what it would be if returns were independent and each place on
@@ -38,7 +39,11 @@ struct NoisyCylinderConfig {
   double stray_reach_m = 0.1;    // beyond the radius: points of no stem are spread so far
   double most_strays = 0.5;      // share of the returns that are of no stem, at most
   double most_scatter_m = 0.06;  // of ranges
-  double held_radius_m = 0.0;    // a smaller radius is held at this one; 0: such a fit fails
+  // Standard deviation of the points along the beams, beside the scatter. 0: it is taken for
+  // scatter to all sides, and where there is much of it, stems come out too thin.
+  double range_noise_m = 0.0;
+  bool find_range_noise = false;  // only begins with that
+  double held_radius_m = 0.0;     // a smaller radius is held at this one; 0: such a fit fails
 };
 
 // Points should be those within `stray_reach_m` of the stem's surface. Deterministic.

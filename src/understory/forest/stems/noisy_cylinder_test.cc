@@ -54,6 +54,52 @@ TEST(NoisyCylinder, ScatterAsLargeAsAThirdOfTheRadiusDoesNotMakeTheStemThicker) 
   EXPECT_NEAR(sum / kStems, 0.075, 0.006);
 }
 
+// The same where the noise lies along the beams, which come from the side of negative y.
+std::vector<SlicePoint> seen_with_noisy_ranges(double radius, double noise, int count,
+                                               Random& random) {
+  std::vector<SlicePoint> points = seen_from_one_side(radius, 0.008, count, random);
+  for (SlicePoint& point : points)
+    point.y += static_cast<float>(random.normal(0.0, noise));
+  return points;
+}
+
+TEST(NoisyCylinder, NoiseOfRangesThatIsKnownDoesNotMakeTheStemThinner) {
+  Random random(5);
+  double known = 0.0;
+  double unknown = 0.0;
+  constexpr int kStems = 20;
+  for (int i = 0; i < kStems; ++i) {
+    const std::vector<SlicePoint> points = seen_with_noisy_ranges(0.12, 0.04, 400, random);
+    NoisyCylinderConfig config;
+    config.stray_reach_m = 0.18;
+    unknown += fit_noisy_cylinder(points, start_at(0.11, 0.0, 0.0), config).radius_m / kStems;
+    config.range_noise_m = 0.04;
+    const NoisyCylinder fit = fit_noisy_cylinder(points, start_at(0.11, 0.0, 0.0), config);
+    ASSERT_TRUE(fit.converged);
+    EXPECT_EQ(fit.range_noise_m, 0.04);
+    EXPECT_NEAR(fit.scatter_m, 0.008, 0.004);
+    known += fit.radius_m / kStems;
+  }
+  // From one side it is an eighth of the noise too thin: neighbouring directions share the view.
+  EXPECT_NEAR(known, 0.12, 0.006);
+  EXPECT_LT(unknown, 0.105);
+}
+
+TEST(NoisyCylinder, NoiseOfRangesIsFound) {
+  Random random(6);
+  for (const double noise : {0.0, 0.012, 0.03, 0.05}) {
+    NoisyCylinderConfig config;
+    config.stray_reach_m = 0.2;
+    config.range_noise_m = 0.02;
+    config.find_range_noise = true;
+    config.cycles = 40;
+    const NoisyCylinder fit = fit_noisy_cylinder(seen_with_noisy_ranges(0.15, noise, 600, random),
+                                                 start_at(0.14, 0.0, 0.0), config);
+    ASSERT_TRUE(fit.converged) << noise;
+    EXPECT_NEAR(fit.range_noise_m, noise, 0.005) << noise;
+  }
+}
+
 TEST(NoisyCylinder, LittleScatterLeavesPlaceAndRadiusToMillimetres) {
   Random random(2);
   Eigen::Vector2d centre(0.0, 0.0);

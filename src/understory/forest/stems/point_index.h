@@ -16,14 +16,16 @@ namespace understory {
 class PointIndex {
  public:
   explicit PointIndex(std::vector<SlicePoint>& points) : end_(points.size()) {
-    std::sort(points.begin(), points.end(), [](const SlicePoint& a, const SlicePoint& b) {
+    const auto is_before = [](const SlicePoint& a, const SlicePoint& b) {
       const std::uint64_t cell_a = key(a);
       const std::uint64_t cell_b = key(b);
       if (cell_a != cell_b) return cell_a < cell_b;
       if (a.x != b.x) return a.x < b.x;
       if (a.y != b.y) return a.y < b.y;
       return a.height_m != b.height_m ? a.height_m < b.height_m : a.returns < b.returns;
-    });
+    };
+    if (!std::is_sorted(points.begin(), points.end(), is_before))
+      std::sort(points.begin(), points.end(), is_before);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const std::uint64_t cell = key(points[i]);
       if (cells_.empty() || cells_.back().key != cell) cells_.push_back({cell, i});

@@ -70,7 +70,7 @@ bool same_stem(const StemFit& a, const StemFit& b) {
          std::max(kSameOfBoth * (larger + smaller), larger + kSameOfSmaller * smaller);
 }
 
-// A fit, and the points that it was made of where sections at breast height are to be fitted.
+// A fit, and the points that it was made of.
 struct StemCandidate {
   StemFitResult fit;
   std::vector<SlicePoint> near;
@@ -251,9 +251,8 @@ bool is_foliage_stem(const StemFitResult& fit, const std::vector<SlicePoint>& ne
          stands_in_foliage(near, stem) && is_tree(stem, search.index, search.points, config);
 }
 
-// Adds what no better stem explains. Only these stems get sections: most stems were fitted several
-// times.
-void add_unclaimed(std::vector<StemCandidate> fits, const StemDetectorConfig& config,
+// Adds what no better stem explains. `sections`: the radius is told by them, too.
+void add_unclaimed(std::vector<StemCandidate> fits, bool sections, const StemDetectorConfig& config,
                    Search& search) {
   const std::size_t known = search.stems.size();
   std::vector<std::vector<SlicePoint>> near;
@@ -269,9 +268,10 @@ void add_unclaimed(std::vector<StemCandidate> fits, const StemDetectorConfig& co
     search.know(fit.stem);
     near.push_back(std::move(candidate.near));
   }
+  if (!sections) return;
   parallel_for(near.size(), 1, [&](std::size_t i) {
     StemFit& stem = search.stems[known + i];
-    if (!near[i].empty()) stem.section_radius_m = radius_with_sections(near[i], stem);
+    stem.section_radius_m = radius_with_sections(near[i], stem);
   });
 }
 
@@ -299,7 +299,7 @@ void add_thin_stems(double most_m, const StemDetectorConfig& config, const StemS
   add_unclaimed(
       fit_all(columns, progress,
               [&](const StemFit& column) { return fit_column(search, column, most_m, config); }),
-      config, search);
+      false, config, search);
 }
 
 void add_foliage_stems(const StemDetectorConfig& config, const StemSearchArea& where,
@@ -326,7 +326,7 @@ void add_stems(const SliceCut& cut, const StemDetectorConfig& config, const Stem
     return fit_start(search, start, cut, config);
   });
   sort_by_support(fits);
-  add_unclaimed(std::move(fits), config, search);
+  add_unclaimed(std::move(fits), cut.only_clear, config, search);
 }
 
 }  // namespace

@@ -62,8 +62,10 @@ struct StemFit {
   double taper = 0.0;             // of the radius per metre of height (negative: thinner upwards)
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();       // of centre x, y and radius
   Eigen::Matrix2d foot_covariance = Eigen::Matrix2d::Zero();  // of the centre line at the ground
-  double spread_m = 0.0;    // of the radius, if returns were independent; see diameter_sd_m
-  double scatter_m = 0.0;   // of the points about the noisy cylinder's surface, in each direction
+  double spread_m = 0.0;   // of the radius, if returns were independent; see diameter_sd_m
+  double scatter_m = 0.0;  // of the points about the noisy cylinder's surface, in each direction
+  // Beside it along the beams, see measure_at_breast_height; 0: it is part of the scatter.
+  double range_noise_m = 0.0;
   double below_sd_m = 0.0;  // of the radius: how the taper may differ below what was seen
   double rms_m = 0.0;       // of the points on the surface
   bool in_foliage = false;  // a thin column that foliage surrounds; see foliage_columns.h

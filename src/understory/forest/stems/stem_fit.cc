@@ -300,19 +300,22 @@ void take_over(const NoisyCylinder& fit, const std::vector<SlicePoint>& points,
                const StemDetectorConfig& config, StemFitResult& result) {
   result.converged = fit.converged && 2.0 * fit.radius_m <= config.max_dbh_m;
   if (!result.converged) return;
-  StemFit& stem = result.stem;
+  take_cylinder(fit, result.stem);
+  result.evidence.scatter_m = std::clamp(fit.scatter_m, kLeastScatter, most_scatter_m(config));
+  judge(points, config, result);
+  result.evidence.scatter_m = fit.scatter_m;
+}
+
+}  // namespace
+
+void take_cylinder(const NoisyCylinder& fit, StemFit& stem) {
   stem.centre = fit.centre;
   stem.slope = fit.slope;
   stem.radius_m = fit.radius_m;
   stem.taper = fit.taper;
-  result.evidence.scatter_m = std::clamp(fit.scatter_m, kLeastScatter, most_scatter_m(config));
-  judge(points, config, result);
-  result.evidence.scatter_m = fit.scatter_m;
   stem.scatter_m = fit.scatter_m;
   set_uncertainty(fit, stem);
 }
-
-}  // namespace
 
 StemFitResult fit_stem(const std::vector<SlicePoint>& points, const StemFit& start,
                        const StemDetectorConfig& config) {

@@ -8,6 +8,8 @@
 
 namespace understory {
 
+struct NoisyCylinder;
+
 // Figures of a fit that decide whether it is a stem.
 struct StemEvidence {
   int on = 0;       // thinned points on the surface
@@ -49,5 +51,8 @@ struct StemFitResult {
 // lie on all sides of it, and most of those near it may be theirs.
 [[nodiscard]] StemFitResult fit_in_foliage(const std::vector<SlicePoint>& points,
                                            const StemFit& column, const StemDetectorConfig& config);
+
+// Axis, radius, taper and scatter of a fit that converged, and how sure they are.
+void take_cylinder(const NoisyCylinder& fit, StemFit& stem);
 
 }  // namespace understory

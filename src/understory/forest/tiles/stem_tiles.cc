@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -10,6 +11,7 @@
 #include "understory/forest/slice/shadowed_points.h"
 #include "understory/forest/slice/slice_thinner.h"
 #include "understory/forest/stems/blurred_stems.h"
+#include "understory/forest/stems/range_noise.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/tiles/tile_shelf.h"
 
@@ -88,6 +90,7 @@ class StemTiles {
                                 {{}, origin_.head<2>()}, progress_),
             harvest.stems);
       }
+      measure(harvest);
       return harvest;
     }
     for (const StemCut cut : {StemCut::kThin, StemCut::kThick})
@@ -108,6 +111,7 @@ class StemTiles {
           harvest.stems);
     }
     if (config_.thin_dbh_m > 0.0) search_cut(StemCut::kThinnest, harvest.stems);
+    measure(harvest);
     add_shown(harvest.slices);
     harvest.thinned = std::move(slices_);
     return harvest;
@@ -199,6 +203,53 @@ class StemTiles {
     stems.insert(stems.end(), std::make_move_iterator(found.begin()),
                  std::make_move_iterator(found.end()));
     sort_by_place(stems);
+  }
+
+  // Calls visit(place in the list, points around it) for some of the stems, several at once.
+  template <typename Visit>
+  void visit_stems(const std::vector<std::size_t>& some, StemHarvest& harvest, const Visit& visit) {
+    const std::vector<StemFit> found = harvest.stems;  // before they are measured
+    const auto visit_all = [&](const std::vector<std::size_t>& here, const StemPoints& points) {
+      parallel_for(here.size(), 1, [&](std::size_t i) {
+        progress_.poll();
+        visit(here[i], points.around(found[here[i]]));
+      });
+    };
+    if (cloud_.tiles().size() == 1) return visit_all(some, StemPoints(harvest.slices, found));
+    for_tiles(cloud_, [&](std::size_t tile) {
+      const GroundArea area = local(tile);
+      std::vector<std::size_t> here;
+      for (const std::size_t i : some) {
+        if (area.contains(found[i].centre)) here.push_back(i);
+      }
+      if (here.empty()) return;
+      std::vector<SlicePoint> points =
+          points_in(slices_, cloud_, origin_, area.grown(kMeasuredBeyond));
+      visit_all(here, StemPoints(points, found));
+    });
+  }
+
+  // The noise along the beams, and the stems measured with it. Those whose foot is hidden are
+  // measured already, and those within foliage stay as they are.
+  void measure(StemHarvest& harvest) {
+    const std::vector<std::size_t> best = stems_for_range_noise(harvest.stems);
+    std::vector<std::optional<RangeNoiseFits>> fits(harvest.stems.size());
+    visit_stems(best, harvest, [&](std::size_t i, const std::vector<SlicePoint>& points) {
+      fits[i] = fit_range_noise(points, harvest.stems[i]);
+    });
+    std::vector<RangeNoiseFits> told;
+    for (const std::optional<RangeNoiseFits>& fit : fits) {
+      if (fit) told.push_back(*fit);
+    }
+    harvest.range_noise_m = range_noise_of(told);
+    std::vector<std::size_t> all;
+    for (std::size_t i = 0; i < harvest.stems.size(); ++i) {
+      if (!harvest.stems[i].in_foliage && harvest.stems[i].below_sd_m == 0.0) all.push_back(i);
+    }
+    visit_stems(all, harvest, [&](std::size_t i, const std::vector<SlicePoint>& points) {
+      measure_at_breast_height(points, harvest.range_noise_m, harvest.stems[i]);
+    });
+    sort_by_place(harvest.stems);
   }
 
   // A cloud of any size has no more than so many for the report.

@@ -28,8 +28,9 @@ struct StemHarvest {
   std::vector<SlicePoint> slices;  // see InventoryResult
   // All thinned points of each tile, where there are several.
   std::optional<TileShelf<SlicePoint>> thinned;
-  std::vector<StemFit> stems;  // by x, then y
+  std::vector<StemFit> stems;  // by x, then y; measured at breast height
   double blur_m = 0.0;         // see add_blurred_stems
+  double range_noise_m = 0.0;  // see range_noise_of
 };
 
 // The thinned points of a cloud by their places, relative to the origin of its inventory (world
@@ -53,10 +54,10 @@ class SlicesNear {
 };
 
 // Stems of a cloud, tile by tile. They are the same whatever the tiles are: what is farther from a
-// stem than stem_search_reach has no influence on it. Only the blur is that of the whole cloud. (In
-// a row of 3 m and more, where stems or circles compete, the first of the row may have influence;
-// no case has been seen.) Slices and stems are relative to `origin` (world frame). Polls
-// `progress`.
+// stem than stem_search_reach has no influence on it. Only the blur and the noise are those of the
+// whole cloud. (In a row of 3 m and more, where stems or circles compete, the first of the row may
+// have influence; no case has been seen.) Slices and stems are relative to `origin` (world frame).
+// Polls `progress`.
 [[nodiscard]] StemHarvest find_stems(const TiledCloud& cloud, const GroundModel& ground,
                                      const Eigen::Vector3d& origin,
                                      const StemDetectorConfig& config,
