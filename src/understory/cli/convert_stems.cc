@@ -14,6 +14,7 @@
 #include "understory/recording/clouds/cloud_file.h"
 #include "understory/util/error.h"
 #include "understory/util/files/staged_output.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -52,8 +53,8 @@ int convert_cloud_to_stems(const std::string& input, const std::string& output, 
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   if (stand.cloud.origin.cwiseAbs().maxCoeff() > kNear) {
     origin = stand.cloud.origin;
-    context.log.info(fmt::format("positions are relative to {:.3f} {:.3f} {:.3f}", origin.x(),
-                                 origin.y(), origin.z()));
+    context.log.info(fmt::format("positions are relative to {} {} {}", fixed_text(origin.x(), 3),
+                                 fixed_text(origin.y(), 3), fixed_text(origin.z(), 3)));
   }
   StemsWriter writer(staged.part());
   for (const Stem& stem : stems_of(found, origin))

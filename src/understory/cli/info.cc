@@ -6,6 +6,7 @@
 #include "understory/cli/command.h"
 #include "understory/cli/open_options.h"
 #include "understory/cli/suggestion.h"
+#include "understory/cli/terminal.h"
 #include "understory/pipeline/source.h"
 #include "understory/recording/recording_info.h"
 
@@ -165,7 +166,8 @@ void print_imu(const RecordingInfo::Imu& imu) {
       imu.highest_angular_rate_rad_s);
   const Eigen::Vector3d& up = imu.up_in_imu;
   if (up.norm() > 0.5)
-    std::printf("  up is (%.2f, %.2f, %.2f) in the IMU's frame\n", up.x(), up.y(), up.z());
+    std::printf("  up is (%s) in the IMU's frame\n",
+                number_row({up.x(), up.y(), up.z()}, 2, ", ").c_str());
   std::printf("  axes of gyroscope and accelerometer: %s\n",
               imu.gyroscope_axes.empty()      ? "too little tilting to tell"
               : imu.gyroscope_axes == "x y z" ? "agree"
@@ -179,8 +181,9 @@ void print_pose(const char* name, const std::optional<Pose>& pose, const std::st
   }
   const Eigen::Vector3d& t = pose->translation();
   const Eigen::Quaterniond& q = pose->rotation();
-  std::printf("  %s: (%.4f, %.4f, %.4f) m, quaternion xyzw (%.5f, %.5f, %.5f, %.5f); %s\n", name,
-              t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), source.c_str());
+  std::printf("  %s: (%s) m, quaternion xyzw (%s); %s\n", name,
+              number_row({t.x(), t.y(), t.z()}, 4, ", ").c_str(),
+              number_row({q.x(), q.y(), q.z(), q.w()}, 5, ", ").c_str(), source.c_str());
 }
 
 // Of one cloud nothing is said of rates, gaps and extrinsics: it has none.

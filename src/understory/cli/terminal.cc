@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "understory/cli/command.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -148,6 +149,13 @@ StopRequested install_stop_handler() {
 
 void stop_at_once() {
   at_once = 1;
+}
+
+std::string number_row(std::initializer_list<double> values, int decimals, const char* separator) {
+  std::string row;
+  for (const double value : values)
+    row += (row.empty() ? "" : separator) + fixed_text(value, decimals);
+  return row;
 }
 
 }  // namespace understory

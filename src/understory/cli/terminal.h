@@ -1,5 +1,8 @@
 #pragma once
 
+#include <initializer_list>
+#include <string>
+
 #include "understory/util/log.h"
 #include "understory/util/progress.h"
 
@@ -17,5 +20,9 @@ namespace understory {
 // From now on the first one does, with the exit code of a stopped command: for commands that leave
 // no files.
 void stop_at_once();
+
+// Numbers side by side, with so many decimals: "0.120, -0.003, 0.000".
+[[nodiscard]] std::string number_row(std::initializer_list<double> values, int decimals,
+                                     const char* separator);
 
 }  // namespace understory

@@ -8,6 +8,7 @@
 #include "understory/geometry/best_rotation.h"
 #include "understory/util/angles.h"
 #include "understory/util/error.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -130,8 +131,9 @@ double yaw_deg(const Pose& target_from_source) {
 
 std::string motion_text(const Pose& target_from_source) {
   const Eigen::Vector3d& t = target_from_source.translation();
-  return fmt::format("x {:+.3f}, y {:+.3f}, z {:+.3f} m, yaw {:+.3f} deg, {:.3f} deg in all", t.x(),
-                     t.y(), t.z(), yaw_deg(target_from_source),
+  return fmt::format("x {}, y {}, z {} m, yaw {} deg, {:.3f} deg in all", signed_text(t.x(), 3),
+                     signed_text(t.y(), 3), signed_text(t.z(), 3),
+                     signed_text(yaw_deg(target_from_source), 3),
                      kDegPerRad * target_from_source.angle());
 }
 

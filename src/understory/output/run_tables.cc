@@ -144,9 +144,9 @@ void write_stem_curves(const std::filesystem::path& path, const std::vector<Tree
   file.write("tree_id,height_m,x,y,diameter_m,diameter_sd_m,measured\n");
   for (std::size_t i = 0; i < curves.size(); ++i) {
     for (const CurveSection& section : curves[i].sections)
-      file.write(fmt::format("{},{:.2f},{:.3f},{:.3f},{:.4f},{:.4f},{}\n", trees[i].id,
-                             section.height_m, origin.x() + section.centre.x(),
-                             origin.y() + section.centre.y(), section.diameter_m,
+      file.write(fmt::format("{},{:.2f},{},{},{:.4f},{:.4f},{}\n", trees[i].id, section.height_m,
+                             csv_cell(origin.x() + section.centre.x(), 3),
+                             csv_cell(origin.y() + section.centre.y(), 3), section.diameter_m,
                              section.diameter_sd_m, section.measured ? 1 : 0));
   }
   file.commit();
@@ -160,10 +160,11 @@ void write_dead_wood(const std::filesystem::path& path, const std::vector<DeadWo
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     const DeadWood& piece = pieces[i];
     file.write(fmt::format(
-        "{},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{:.4f},{}\n",
-        i + 1, dead_wood_name(piece.kind), piece.from.x(), piece.from.y(), piece.from.z(),
-        piece.to.x(), piece.to.y(), piece.to.z(), piece.diameter_m, piece.diameter_to_m,
-        piece.diameter_sd_m, piece.length_m(), piece.volume_m3(), piece.observations));
+        "{},{},{},{},{},{},{},{},{:.3f},{:.3f},{:.3f},{:.2f},{:.4f},{}\n", i + 1,
+        dead_wood_name(piece.kind), csv_cell(piece.from.x(), 3), csv_cell(piece.from.y(), 3),
+        csv_cell(piece.from.z(), 3), csv_cell(piece.to.x(), 3), csv_cell(piece.to.y(), 3),
+        csv_cell(piece.to.z(), 3), piece.diameter_m, piece.diameter_to_m, piece.diameter_sd_m,
+        piece.length_m(), piece.volume_m3(), piece.observations));
   }
   file.commit();
 }
@@ -172,9 +173,9 @@ void write_tree_falls(const std::filesystem::path& path, const std::vector<TreeF
   AtomicTextFile file(path);
   file.write("id,x,y,seen_until,gone_since,missed\n");
   for (const TreeFall& fall : falls)
-    file.write(fmt::format("{},{:.3f},{:.3f},{},{},{}\n", fall.tree_id, fall.x, fall.y,
-                           format_seconds(fall.seen_until), format_seconds(fall.gone_since),
-                           fall.missed));
+    file.write(fmt::format("{},{},{},{},{},{}\n", fall.tree_id, csv_cell(fall.x, 3),
+                           csv_cell(fall.y, 3), format_seconds(fall.seen_until),
+                           format_seconds(fall.gone_since), fall.missed));
   file.commit();
 }
 

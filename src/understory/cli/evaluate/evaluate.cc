@@ -14,6 +14,7 @@
 #include "understory/evaluation/trajectory_errors.h"
 #include "understory/util/error.h"
 #include "understory/util/files/file_in_folder.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -142,8 +143,8 @@ std::string to_text(const TrajectoryErrors& e, const std::optional<Eigen::Vector
       "length of truth     {:.3f} m\n"
       "APE                 rmse {:.4f} m, in the plane {:.4f} m, mean {:.4f} m, median {:.4f} m, "
       "max {:.4f} m, rotation {}\n"
-      "drift at the end    {:.4f} m{} (first pose aligned; x {:+.4f}, y {:+.4f}, z {:+.4f} m; in "
-      "the plane {:.4f} m)\n"
+      "drift at the end    {:.4f} m{} (first pose aligned; x {}, y {}, z {} m; in the plane "
+      "{:.4f} m)\n"
       "scale of the path   {}\n",
       e.alignment == Alignment::kNone
           ? "none (positions as they are)"
@@ -154,8 +155,9 @@ std::string to_text(const TrajectoryErrors& e, const std::optional<Eigen::Vector
                              : "not determined",
       e.drift_end_m,
       std::isfinite(e.drift_percent) ? fmt::format(" = {:.4f} %", e.drift_percent) : "",
-      e.drift_end.x(), e.drift_end.y(), e.drift_end.z(), e.drift_plane_m,
-      e.scale_percent ? fmt::format("{:+.4f} %", *e.scale_percent) : "not determined");
+      signed_text(e.drift_end.x(), 4), signed_text(e.drift_end.y(), 4),
+      signed_text(e.drift_end.z(), 4), e.drift_plane_m,
+      e.scale_percent ? signed_text(*e.scale_percent, 4) + " %" : "not determined");
   text += steps_text(e);
   text += velocity ? fmt::format("velocity            rmse x {:.4f}, y {:.4f}, z {:.4f} m/s\n",
                                  velocity->x(), velocity->y(), velocity->z())

@@ -16,6 +16,7 @@
 #include "understory/util/error.h"
 #include "understory/util/files/file_in_folder.h"
 #include "understory/util/files/output_guard.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -140,7 +141,7 @@ std::string epochs_json(const Epoch& before, const Epoch& after, const EpochResu
 
 std::string increments_text(const char* name, const char* unit, const IncrementSummary& s) {
   if (s.known == 0) return {};
-  std::string text = fmt::format("{:<20}mean {:+.4f} {}", name, s.mean, unit);
+  std::string text = fmt::format("{:<20}mean {} {}", name, signed_text(s.mean, 4), unit);
   if (std::isfinite(s.mean_sd)) text += fmt::format(" +- {:.4f}", s.mean_sd);
   text += fmt::format(" over {} trees; {} grew and {} shrank beyond 1.96 sd", s.known, s.grown,
                       s.shrunk);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "understory/evaluation/alignment.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -65,9 +66,10 @@ std::string classes_text(const std::vector<ErrorsOfClass>& classes) {
     if (std::none_of(classes.begin(), classes.end(), told)) continue;
     lines[0] += fmt::format("{:>{}}", column.title, kWidth);
     for (std::size_t k = 0; k < classes.size(); ++k)
-      lines[k + 1] += told(classes[k]) ? fmt::format("{:>{}.{}f}", classes[k].errors.*column.figure,
-                                                     kWidth, column.decimals)
-                                       : fmt::format("{:>{}}", "", kWidth);
+      lines[k + 1] += fmt::format(
+          "{:>{}}",
+          told(classes[k]) ? fixed_text(classes[k].errors.*column.figure, column.decimals) : "",
+          kWidth);
   }
   std::string text;
   for (const std::string& line : lines)
@@ -87,15 +89,16 @@ std::string figures_text(const TreeErrors& e) {
        fmt::format("overlapping trees   {:.4f} (share of B whose stem overlaps its partner's)\n",
                    e.overlapping_tree_ratio));
   tell(e.position_rmse_m,
-       fmt::format("position            rmse {:.4f} m (horizontal), bias {:+.4f} m in x, {:+.4f} m "
-                   "in y (A minus B)\n",
-                   e.position_rmse_m, e.x_bias_m, e.y_bias_m));
-  tell(e.dbh_rmse_m, fmt::format("diameter            rmse {:.4f} m, bias {:+.4f} m (A minus B)\n",
-                                 e.dbh_rmse_m, e.dbh_bias_m));
-  tell(e.height_rmse_m, fmt::format("height              rmse {:.4f} m, bias {:+.4f} m\n",
-                                    e.height_rmse_m, e.height_bias_m));
-  tell(e.volume_rmse_m3, fmt::format("stem volume         rmse {:.4f} m3, bias {:+.4f} m3\n",
-                                     e.volume_rmse_m3, e.volume_bias_m3));
+       fmt::format(
+           "position            rmse {:.4f} m (horizontal), bias {} m in x, {} m in y (A minus "
+           "B)\n",
+           e.position_rmse_m, signed_text(e.x_bias_m, 4), signed_text(e.y_bias_m, 4)));
+  tell(e.dbh_rmse_m, fmt::format("diameter            rmse {:.4f} m, bias {} m (A minus B)\n",
+                                 e.dbh_rmse_m, signed_text(e.dbh_bias_m, 4)));
+  tell(e.height_rmse_m, fmt::format("height              rmse {:.4f} m, bias {} m\n",
+                                    e.height_rmse_m, signed_text(e.height_bias_m, 4)));
+  tell(e.volume_rmse_m3, fmt::format("stem volume         rmse {:.4f} m3, bias {} m3\n",
+                                     e.volume_rmse_m3, signed_text(e.volume_bias_m3, 4)));
   return text;
 }
 

@@ -11,6 +11,7 @@
 #include "understory/cli/register/register_output.h"
 #include "understory/cli/register/register_stems.h"
 #include "understory/cli/suggestion.h"
+#include "understory/cli/terminal.h"
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/preprocess/voxel_filter.h"
 #include "understory/recording/clouds/cloud_file.h"
@@ -177,8 +178,9 @@ void print_text(const RegistrationResult& result, const MatchVerdict& verdict, c
   print_motion(a_from_b);
   const Eigen::Vector3d& p = local.place;
   const Eigen::Vector3d& s = local.shift_m;
-  std::printf("middle_of_b %.3f %.3f %.3f\nshift_there_m %.3f %.3f %.3f\nturn_deg %.3f\n", p.x(),
-              p.y(), p.z(), s.x(), s.y(), s.z(), local.turn_deg);
+  std::printf("middle_of_b %s\nshift_there_m %s\nturn_deg %.3f\n",
+              number_row({p.x(), p.y(), p.z()}, 3, " ").c_str(),
+              number_row({s.x(), s.y(), s.z()}, 3, " ").c_str(), local.turn_deg);
   std::printf("status %s%s%s\n", to_string(result.status).c_str(),
               result.reason.empty() ? "" : ": ", result.reason.c_str());
   std::printf("fitness_m2 %.6f\nsurface_residual_m2 %.6f\ninlier_ratio %.4f\niterations %d\n",
@@ -192,7 +194,8 @@ void print_text(const RegistrationResult& result, const MatchVerdict& verdict, c
   std::printf("degenerate_directions %td\n", result.degenerate_directions.cols());
   for (Eigen::Index i = 0; i < result.degenerate_directions.cols(); ++i) {
     for (int r = 0; r < 6; ++r)
-      std::printf("%.4f%c", result.degenerate_directions(r, i), r == 5 ? '\n' : ' ');
+      std::printf("%s%c", number_row({result.degenerate_directions(r, i)}, 4, "").c_str(),
+                  r == 5 ? '\n' : ' ');
   }
   print_verdict(verdict);
 }

@@ -2,6 +2,8 @@
 
 #include <cstdio>
 
+#include "understory/cli/terminal.h"
+
 namespace understory {
 
 std::vector<double> numbers_of(const Eigen::MatrixXd& matrix) {
@@ -17,8 +19,11 @@ std::vector<double> numbers_of(const Eigen::MatrixXd& matrix) {
 void print_motion(const Pose& a_from_b) {
   const Eigen::Matrix4d matrix = a_from_b.matrix();
   std::printf("a_from_b\n");
-  for (int r = 0; r < 4; ++r)
-    std::printf("%.9f %.9f %.9f %.9f\n", matrix(r, 0), matrix(r, 1), matrix(r, 2), matrix(r, 3));
+  for (int r = 0; r < 4; ++r) {
+    std::printf(
+        "%s\n",
+        number_row({matrix(r, 0), matrix(r, 1), matrix(r, 2), matrix(r, 3)}, 9, " ").c_str());
+  }
 }
 
 nlohmann::ordered_json verdict_json(const MatchVerdict& verdict) {

@@ -12,6 +12,7 @@
 
 #include "understory/evaluation/evaluation_constants.h"
 #include "understory/evaluation/trees/tree_errors.h"
+#include "understory/util/fixed_text.h"
 #include "understory/util/parallel.h"
 #include "understory/util/random.h"
 
@@ -174,8 +175,8 @@ std::string chance_complaint(const MatchChance& chance) {
       "of {:.1f}, and random places of the second map's trees with {:.1f} +- {:.1f}",
       chance.pairs, chance.weight, chance.chance_weight, chance.chance_sd);
   if (std::isfinite(chance.diameter_correlation))
-    text += fmt::format("; their diameters agree with a correlation of {:.2f}",
-                        chance.diameter_correlation);
+    text += fmt::format("; their diameters agree with a correlation of {}",
+                        fixed_text(chance.diameter_correlation, 2));
   return text + ". The maps may be of different stands";
 }
 

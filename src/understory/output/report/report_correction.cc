@@ -4,6 +4,7 @@
 
 #include "understory/output/report/report_parts.h"
 #include "understory/output/report/svg_plot.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 
@@ -27,10 +28,9 @@ std::string correction_section(const ReportInput& input) {
       "class=\"n\">after</th></tr>"
       "</thead><tbody>";
   for (const ReportCorrection::Figure& figure : correction.figures) {
-    html += fmt::format(
-        "<tr><td>{}</td><td class=\"n\">{:.{}f}</td><td class=\"n\">{:.{}f}</td>"
-        "</tr>",
-        escape_html(figure.name), figure.before, figure.digits, figure.after, figure.digits);
+    html += fmt::format("<tr><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td></tr>",
+                        escape_html(figure.name), fixed_text(figure.before, figure.digits),
+                        fixed_text(figure.after, figure.digits));
   }
   html += "</tbody></table></div>";
   html += correction_figures(correction);

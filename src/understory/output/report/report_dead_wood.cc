@@ -6,6 +6,7 @@
 
 #include "understory/output/report/map_view.h"
 #include "understory/output/report/report_parts.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -20,8 +21,7 @@ std::string row_of(std::size_t id, const DeadWood& piece, bool ned) {
   std::string row = fmt::format("<td class=\"n\">{}</td><td>{}</td>", id,
                                 piece.kind == DeadWoodKind::kStump ? "stump" : "lying stem");
   for (const std::string& cell :
-       {fmt::format("{:.2f}", x), fmt::format("{:.2f}", y),
-        fmt::format("{:.0f}", 100.0 * piece.diameter_m),
+       {fixed_text(x, 2), fixed_text(y, 2), fmt::format("{:.0f}", 100.0 * piece.diameter_m),
         fmt::format("{:.0f}", 100.0 * piece.diameter_to_m),
         fmt::format("{:.1f}", 100.0 * piece.diameter_sd_m), fmt::format("{:.1f}", piece.length_m()),
         fmt::format("{:.3f}", piece.volume_m3()), std::to_string(piece.observations)})

@@ -8,6 +8,7 @@
 
 #include "understory/output/report/map_view.h"
 #include "understory/output/report/report_parts.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -35,9 +36,9 @@ const Tree* tree_of(const InventoryResult& inventory, int id) {
 std::string place_text(const MapView& view, const Eigen::Vector3d& place) {
   const Eigen::Vector2d at = view.drawn(place);
   const bool degrees = view.drawing != nullptr && view.per_metre() > 100.0 * view.scale;
-  if (degrees) return fmt::format("x {:.6f}, y {:.6f}", at.x(), at.y());
-  return view.drawing == nullptr ? fmt::format("x {:.1f}, y {:.1f}", at.x(), at.y())
-                                 : fmt::format("E {:.1f}, N {:.1f}", at.x(), at.y());
+  const std::string x = fixed_text(at.x(), degrees ? 6 : 1);
+  const std::string y = fixed_text(at.y(), degrees ? 6 : 1);
+  return degrees || view.drawing == nullptr ? "x " + x + ", y " + y : "E " + x + ", N " + y;
 }
 
 }  // namespace

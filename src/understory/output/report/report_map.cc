@@ -10,6 +10,7 @@
 #include "understory/output/report/png.h"
 #include "understory/output/report/report_parts.h"
 #include "understory/output/report/svg_plot.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -223,15 +224,15 @@ std::string grid_svg(const MapView& view) {
   for (const double east : ticks(view.x0, view.width, longer)) {
     const double x = view.x(east);
     lines += fmt::format("M{:.1f} 0V{:.1f}", x, height);
-    numbers +=
-        fmt::format("<text x=\"{:.1f}\" y=\"15\" text-anchor=\"middle\">E {:.0f}</text>", x, east);
+    numbers += fmt::format("<text x=\"{:.1f}\" y=\"15\" text-anchor=\"middle\">E {}</text>", x,
+                           fixed_text(east, 0));
   }
   for (const double north : ticks(view.y0, view.height, longer)) {
     const double y = view.y(north);
     lines += fmt::format("M0 {:.1f}H{:.1f}", y, width);
     // Above its line, but below the numbers to the east.
     const double base = y < kTopStrip + 15.0 ? std::max(y, kTopStrip) + 15.0 : y - 4.0;
-    numbers += fmt::format("<text x=\"4\" y=\"{:.1f}\">N {:.0f}</text>", base, north);
+    numbers += fmt::format("<text x=\"4\" y=\"{:.1f}\">N {}</text>", base, fixed_text(north, 0));
   }
   return fmt::format(
       "<g class=\"grid\"><path d=\"{}\" fill=\"none\" stroke=\"#111\" stroke-width=\"0.7\" "

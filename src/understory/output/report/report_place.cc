@@ -10,6 +10,7 @@
 #include "understory/georeference/systems/coordinate_system.h"
 #include "understory/output/report/report_parts.h"
 #include "understory/output/report/svg_plot.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -92,13 +93,14 @@ void add_coordinates(const ReportInput& input, const RunPlace& place, Rows& rows
                                     : system->name() + " (" + place.coordinate_system + ")");
   if (input.scans.empty()) return;
   const Eigen::Vector3d at = input.drawing->from_world(input.scans.front().position.cast<double>());
-  rows.add("start of the path",
-           fmt::format("E {:.1f}, N {:.1f}, height {:.1f} m", at.x(), at.y(), at.z()));
+  rows.add("start of the path", fmt::format("E {}, N {}, height {} m", fixed_text(at.x(), 1),
+                                            fixed_text(at.y(), 1), fixed_text(at.z(), 1)));
 }
 
 void add_origin(const RunPlace& place, Rows& rows) {
   rows.add("latitude, longitude of the place",
-           fmt::format("{:.6f}°, {:.6f}°", place.origin.latitude_deg, place.origin.longitude_deg));
+           fmt::format("{}°, {}°", fixed_text(place.origin.latitude_deg, 6),
+                       fixed_text(place.origin.longitude_deg, 6)));
   rows.add("heights are", place.heights);
   if (std::abs(place.north_deg) < 0.005) return;
   rows.add("north",
@@ -118,8 +120,9 @@ void add_errors(const ReportInput& input, const RunPlace& place, Rows& rows) {
     if (found == input.summary.quality.end()) continue;
     const double* value = std::get_if<double>(&found->second);
     if (value == nullptr || !std::isfinite(*value)) continue;
-    rows.add(residual.name,
-             fmt::format("{:.{}f} {}", residual.factor * *value, residual.digits, residual.unit));
+    rows.add(
+        residual.name,
+        fmt::format("{} {}", fixed_text(residual.factor * *value, residual.digits), residual.unit));
   }
 }
 

@@ -6,6 +6,7 @@
 #include "understory/output/output_constants.h"
 #include "understory/output/report/report_parts.h"
 #include "understory/output/report/svg_plot.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 
@@ -255,12 +256,12 @@ std::string imu_section(const ReportInput& input) {
           ? std::string("It was mapped with those given.")
           : fmt::format(
                 "It was mapped with an IMU that lies {:.3f} m and {:.2f} degrees from where "
-                "it was given, and whose stamps are {:.1f} ms late.",
-                imu.moved_m, imu.turned_deg, 1e3 * imu.used_late_s));
+                "it was given, and whose stamps are {} ms late.",
+                imu.moved_m, imu.turned_deg, fixed_text(1e3 * imu.used_late_s, 1)));
   const auto row = [&](const char* name, double value, std::size_t parameter, double unit) {
     const double sd = unit * std::sqrt(std::max(imu.covariance[8 * parameter], 0.0));
-    html += fmt::format("<tr><td>{}</td><td class=\"n\">{:.3f}</td><td class=\"n\">{}</td></tr>",
-                        name, value, sd > 0.0 ? fmt::format("{:.3f}", sd) : "as given");
+    html += fmt::format("<tr><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td></tr>", name,
+                        fixed_text(value, 3), sd > 0.0 ? fmt::format("{:.3f}", sd) : "as given");
   };
   row("stamps late by, ms", 1e3 * imu.late_s, 6, 1e3);
   row("x on the body, m", imu.translation_m[0], 3, 1.0);

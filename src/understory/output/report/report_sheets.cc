@@ -11,6 +11,7 @@
 #include "understory/forest/trees/tree_heights.h"
 #include "understory/output/report/png.h"
 #include "understory/output/report/report_parts.h"
+#include "understory/util/fixed_text.h"
 #include "understory/util/stable_sort.h"
 
 namespace understory {
@@ -22,7 +23,7 @@ std::string whole_cm(double metres) {
 }
 
 std::string shortest(double value, int decimals) {
-  return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : std::string();
+  return std::isfinite(value) ? fixed_text(value, decimals) : std::string();
 }
 
 char byte_of(double value) {

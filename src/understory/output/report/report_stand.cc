@@ -9,6 +9,7 @@
 #include "understory/output/report/png.h"
 #include "understory/output/report/report_parts.h"
 #include "understory/output/report/svg_plot.h"
+#include "understory/util/fixed_text.h"
 #include "understory/util/stable_sort.h"
 
 namespace understory {
@@ -24,11 +25,11 @@ constexpr std::size_t kFewestPointsWithoutTree = 1'000;  // a stem that was miss
 constexpr std::size_t kLongestTable = 3'000;
 
 std::string centimetres(double metres) {
-  return std::isfinite(metres) ? fmt::format("{:.1f}", 100.0 * metres) : "";
+  return std::isfinite(metres) ? fixed_text(100.0 * metres, 1) : "";
 }
 
 std::string metres(double value, int decimals) {
-  return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "";
+  return std::isfinite(value) ? fixed_text(value, decimals) : "";
 }
 
 // A square (or smaller) part of the stand, relative to the inventory's origin.
@@ -138,10 +139,11 @@ std::string cross_sections(const InventoryResult& inventory) {
   html += panels.size() == 1 ? " one\">" : "\">";
   for (const Panel& panel : panels) {
     html += "<figure>" + cross_section(inventory, panel) +
-            fmt::format(
-                "<figcaption>x {:.0f} to {:.0f} m, y {:.0f} to {:.0f} m</figcaption></figure>",
-                inventory.origin.x() + panel.x0, inventory.origin.x() + panel.x0 + panel.width,
-                inventory.origin.y() + panel.y0, inventory.origin.y() + panel.y0 + panel.height);
+            fmt::format("<figcaption>x {} to {} m, y {} to {} m</figcaption></figure>",
+                        fixed_text(inventory.origin.x() + panel.x0, 0),
+                        fixed_text(inventory.origin.x() + panel.x0 + panel.width, 0),
+                        fixed_text(inventory.origin.y() + panel.y0, 0),
+                        fixed_text(inventory.origin.y() + panel.y0 + panel.height, 0));
   }
   html += "</div>";
   if (all > panels.size()) {

@@ -13,6 +13,7 @@
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
 #include "understory/util/files/staged_output.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -55,8 +56,8 @@ std::string rig_yaml(const std::vector<LidarClock>& clocks) {
     text += fmt::format("  - topic: \"{}\"\n", clock.topic);
     if (!clock.rig.lidar_model.empty())
       text += fmt::format("    lidar_model: \"{}\"\n", clock.rig.lidar_model);
-    text += fmt::format("    body_from_lidar: {}\n    late_s: {:.6f}\n",
-                        pose_yaml(clock.rig.body_from_lidar), clock.late_s);
+    text += fmt::format("    body_from_lidar: {}\n    late_s: {}\n",
+                        pose_yaml(clock.rig.body_from_lidar), fixed_text(clock.late_s, 6));
   }
   const auto add = [&](const char* key, const std::optional<Pose>& place) {
     if (place) text += fmt::format("{}: {}\n", key, pose_yaml(*place));
@@ -114,8 +115,8 @@ LidarClocksOutcome run_lidar_clocks(const LidarClocksRequest& request, Log& log,
     outcome.clocks.push_back(find_clock(request, lidar, folder.part(), log, progress, doubts));
     const LidarClock& clock = outcome.clocks.back();
     judge_clock(clock, doubts, outcome);
-    outcome.summary += fmt::format("{:<20} late by {:.2f} ± {:.2f} ms against the IMU\n",
-                                   clock.topic, 1e3 * clock.late_s, 1e3 * clock.sd_s);
+    outcome.summary += fmt::format("{:<20} late by {} ± {:.2f} ms against the IMU\n", clock.topic,
+                                   fixed_text(1e3 * clock.late_s, 2), 1e3 * clock.sd_s);
   }
   outcome.summary += fmt::format("extrinsics: {}", (request.folder / kRigFile).string());
   const auto write = [&](const char* name, const std::string& text) {

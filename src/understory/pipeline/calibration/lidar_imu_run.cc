@@ -16,6 +16,7 @@
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
 #include "understory/util/files/staged_output.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -35,7 +36,7 @@ bool is_lidar_imu_file(const std::string& name) {
 std::string extrinsics_yaml(const Rig& rig, const std::optional<double>& lidar_late_s) {
   std::string text = fmt::format("body_frame: {}\nbody_from_lidar: {}\n", rig.body_frame,
                                  pose_yaml(rig.body_from_lidar));
-  if (lidar_late_s) text += fmt::format("late_s: {:.6f}\n", *lidar_late_s);
+  if (lidar_late_s) text += fmt::format("late_s: {}\n", fixed_text(*lidar_late_s, 6));
   return text + fmt::format("body_from_imu: {}\n", pose_yaml(*rig.body_from_imu));
 }
 
@@ -72,8 +73,8 @@ constexpr double kKeptSd = 1e-6;
 
 // A value with its standard deviation. One that was not found has none, and says so.
 std::string with_sd(double value, double sd, double scale, int decimals) {
-  if (sd < kKeptSd) return fmt::format("{:.{}f} (not found)", scale * value, decimals);
-  return fmt::format("{:.{}f} ± {:.{}f}", scale * value, decimals, scale * sd, decimals);
+  if (sd < kKeptSd) return fixed_text(scale * value, decimals) + " (not found)";
+  return fixed_text(scale * value, decimals) + " ± " + fixed_text(scale * sd, decimals);
 }
 
 std::string axes_with_sds(const Eigen::Vector3d& values, const Eigen::Vector3d& sds, double scale,
@@ -98,11 +99,12 @@ std::string summary_of(const LidarImuOutcome& outcome, const Rig& given, const f
       "Found from {:.1f} s of motion; ± is one standard deviation:\n"
       "place of the IMU in the lidar's frame  {} m\n"
       "turn of the IMU, as a rotation vector  {} degrees\n"
-      "the same turn, as quaternion xyzw      ({:.5f}, {:.5f}, {:.5f}, {:.5f})\n"
+      "the same turn, as quaternion xyzw      ({}, {}, {}, {})\n"
       "clock                                  {}\n",
       result.duration_s,
       axes_with_sds(result.lidar_from_imu.translation(), sd.segment<3>(3), 1.0, 4),
-      axes_with_sds(so3_log(q), sd.head<3>(), kDegreesARad, 3), q.x(), q.y(), q.z(), q.w(),
+      axes_with_sds(so3_log(q), sd.head<3>(), kDegreesARad, 3), fixed_text(q.x(), 5),
+      fixed_text(q.y(), 5), fixed_text(q.z(), 5), fixed_text(q.w(), 5),
       clock_text(result.imu_late_s, sd[6]));
   if (given.body_from_imu) {
     const Pose change =

@@ -13,6 +13,7 @@
 #include "understory/pipeline/mapping/mapping.h"
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -105,10 +106,10 @@ std::vector<StampedPose> lidar_path_of_file(const std::string& file) {
 std::string pose_yaml(const Pose& pose) {
   const Eigen::Vector3d& t = pose.translation();
   const Eigen::Quaterniond& q = pose.rotation();
-  return fmt::format(
-      "{{translation_m: [{:.6f}, {:.6f}, {:.6f}], rotation_xyzw: [{:.9f}, {:.9f}, {:.9f}, "
-      "{:.9f}]}}",
-      t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+  return fmt::format("{{translation_m: [{}, {}, {}], rotation_xyzw: [{}, {}, {}, {}]}}",
+                     fixed_text(t.x(), 6), fixed_text(t.y(), 6), fixed_text(t.z(), 6),
+                     fixed_text(q.x(), 9), fixed_text(q.y(), 9), fixed_text(q.z(), 9),
+                     fixed_text(q.w(), 9));
 }
 
 }  // namespace understory

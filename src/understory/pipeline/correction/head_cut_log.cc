@@ -34,8 +34,8 @@ void write_cuts(const std::filesystem::path& path, const std::vector<PlacedCut>&
   file.write("timestamp,x,y,z,tree_id,distance_m\n");
   for (const PlacedCut& cut : cuts) {
     const Eigen::Vector3d& p = cut.head_in_world;
-    file.write(
-        fmt::format("{},{:.3f},{:.3f},{:.3f},", format_seconds(cut.stamp), p.x(), p.y(), p.z()));
+    file.write(fmt::format("{},{},{},{},", format_seconds(cut.stamp), csv_cell(p.x(), 3),
+                           csv_cell(p.y(), 3), csv_cell(p.z(), 3)));
     file.write(cut.tree_id == 0 ? ",\n" : fmt::format("{},{:.3f}\n", cut.tree_id, cut.distance_m));
   }
   file.commit();

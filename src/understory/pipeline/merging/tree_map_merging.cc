@@ -19,8 +19,10 @@
 #include "understory/util/config/config.h"
 #include "understory/util/error.h"
 #include "understory/util/files/atomic_file.h"
+#include "understory/util/files/csv.h"
 #include "understory/util/files/file_in_folder.h"
 #include "understory/util/files/output_guard.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -51,9 +53,10 @@ void write_field(const fs::path& path, const std::vector<Tree>& b, const Deforma
   AtomicTextFile file(path);
   file.write("x,y,dx,dy,smoothed_dx,smoothed_dy,paired\n");
   for (std::size_t i = 0; i < b.size(); ++i)
-    file.write(fmt::format("{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{}\n", b[i].x, b[i].y,
-                           field.raw[i].x(), field.raw[i].y(), field.smoothed[i].x(),
-                           field.smoothed[i].y(), static_cast<int>(field.paired[i])));
+    file.write(fmt::format("{},{},{},{},{},{},{}\n", csv_cell(b[i].x, 3), csv_cell(b[i].y, 3),
+                           csv_cell(field.raw[i].x(), 3), csv_cell(field.raw[i].y(), 3),
+                           csv_cell(field.smoothed[i].x(), 3), csv_cell(field.smoothed[i].y(), 3),
+                           static_cast<int>(field.paired[i])));
   file.commit();
 }
 
@@ -241,8 +244,8 @@ std::string text_of(const Merge& m) {
     text += fmt::format("\nweight of these pairs {:.1f}; of pairs by chance {:.1f} +- {:.1f}",
                         m.chance.weight, m.chance.chance_weight, m.chance.chance_sd);
   if (std::isfinite(m.chance.diameter_correlation))
-    text += fmt::format("\ndiameters of {} pairs agree with a correlation of {:.2f}",
-                        m.chance.diameters, m.chance.diameter_correlation);
+    text += fmt::format("\ndiameters of {} pairs agree with a correlation of {}",
+                        m.chance.diameters, fixed_text(m.chance.diameter_correlation, 2));
   if (m.best)
     text += fmt::format("\nnearest to the reference with a weight of {:.2f}: {:.3f} m",
                         m.best->weight, m.best->position_rmse_m);

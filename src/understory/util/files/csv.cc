@@ -15,6 +15,7 @@
 
 #include "understory/util/error.h"
 #include "understory/util/files/read_error.h"
+#include "understory/util/fixed_text.h"
 
 namespace understory {
 namespace {
@@ -97,9 +98,7 @@ std::optional<std::uint64_t> to_count(std::string_view text) {
 
 std::string csv_cell(double value, int decimals) {
   if (!std::isfinite(value)) return "";
-  std::string text = fmt::format("{:.{}f}", value, decimals);
-  if (text.front() == '-' && text.find_first_not_of("-0.") == std::string::npos) text.erase(0, 1);
-  return text;
+  return fixed_text(value, decimals);
 }
 
 std::string csv_text(const std::string& text) {
