@@ -10,6 +10,7 @@
 #include "understory/cli/suggestion.h"
 #include "understory/pipeline/inventory/cloud_inventory.h"
 #include "understory/util/error.h"
+#include "understory/util/shell_word.h"
 
 namespace understory {
 namespace {
@@ -61,7 +62,7 @@ int run(const InventoryOptions& options, CommandContext& context) {
                            ? "inventory needs a cloud (or run folder) and -o DIR, the folder to "
                              "write (understory inventory --help)"
                            : "inventory needs -o DIR, the folder to write: `understory inventory " +
-                                 request.cloud + " -o DIR`"});
+                                 shell_word(request.cloud) + " -o DIR`"});
   }
   refuse_recording(request.cloud);
   if (request.copc && (request.slice || request.config.extent == InventoryExtent::kBasic))

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "understory/cli/command.h"
+#include "understory/cli/given_runs.h"
 #include "understory/cli/outcome.h"
 #include "understory/cli/suggestion.h"
 #include "understory/cli/terminal.h"
@@ -235,7 +236,11 @@ int run(int argc, char** argv) {
   Log log(terminal_log(verbose, quiet));
   CommandContext context{log, terminal_progress(quiet), install_stop_handler(), threads,
                          stop_at_once};
-  return with_printed(run_guarded(chosen, context));
+  const Command checked = [&](CommandContext& given) {
+    check_given_runs(app, given.log);
+    return chosen(given);
+  };
+  return with_printed(run_guarded(checked, context));
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 #include "understory/pipeline/source.h"
 #include "understory/util/error.h"
 #include "understory/util/files/output_guard.h"
+#include "understory/util/shell_word.h"
 
 namespace understory {
 namespace {
@@ -48,9 +49,8 @@ int with_advice(const std::string& run_folder, const std::function<int()>& work)
     return work();
   } catch (const Stopped&) {
     if (!holds_unfinished_run(run_folder)) throw;
-    return report_stop(
-        "the scans are positioned, and no map was made; go on with `understory map --resume " +
-        run_folder + "`");
+    return report_stop("the scans are positioned, and no map was made; go on with `" +
+                       resume_command(run_folder) + "`");
   } catch (const RefusedOutput&) {
     throw;
   } catch (const OutputError& error) {
@@ -59,8 +59,8 @@ int with_advice(const std::string& run_folder, const std::function<int()>& work)
     const std::string file = error.file() + ": ";
     throw OutputError(error.file(), said.substr(said.rfind(file, 0) == 0 ? file.size() : 0) +
                                         "; what was mapped so far is kept: make room and go on "
-                                        "with `understory map --resume " +
-                                        run_folder + "`");
+                                        "with `" +
+                                        resume_command(run_folder) + "`");
   }
 }
 
@@ -151,8 +151,8 @@ int run_map(const MapOptions& options, CommandContext& context) {
     throw ConfigError(
         {options.recording.empty()
              ? "map needs a RECORDING and -o RUN, the folder to write (or --resume RUN)"
-             : "map needs -o RUN, the folder to write: `understory map " + options.recording +
-                   " -o RUN`"});
+             : "map needs -o RUN, the folder to write: `understory map " +
+                   shell_word(options.recording) + " -o RUN`"});
   }
   MappingRequest request;
   request.recording = options.recording;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "understory/pipeline/run_folder/run_json.h"
@@ -12,6 +13,7 @@
 #include "understory/recording/bags/ros2_bag.h"
 #include "understory/recording/clouds/cloud_file.h"
 #include "understory/util/error.h"
+#include "understory/util/shell_word.h"
 
 namespace understory {
 namespace {
@@ -66,25 +68,79 @@ std::string single_cloud(const std::string& folder) {
   return found;
 }
 
+// Something beside a name that is not there, which may have been meant. It has the same name with
+// an ending (a recording first), or a letter or two otherwise. Empty if there is none.
+std::string nearest_file(const fs::path& missing) {
+  constexpr std::size_t kMistyped = 2;  // letters [chosen]
+  const std::string meant = missing.filename().string();
+  const fs::path folder = missing.has_parent_path() ? missing.parent_path() : fs::path(".");
+  std::vector<std::string> endings;
+  std::vector<std::string> mistyped;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (meant.size() > kMistyped && name.starts_with(meant + "."))
+      endings.push_back(name);
+    else if (meant.size() > 2 * kMistyped && letters_apart(meant, name) <= kMistyped)
+      mistyped.push_back(name);
+  }
+  std::sort(endings.begin(), endings.end(), [](const std::string& a, const std::string& b) {
+    return std::pair(!names_recording(a), a) < std::pair(!names_recording(b), b);
+  });
+  std::sort(mistyped.begin(), mistyped.end());
+  endings.insert(endings.end(), mistyped.begin(), mistyped.end());
+  return endings.empty() ? std::string() : (missing.parent_path() / endings.front()).string();
+}
+
+// A name of nothing. Simulated recordings have no file.
+void refuse_missing(const std::string& given) {
+  std::error_code error;
+  if (given.empty() || given.starts_with("sim:") ||
+      fs::status(given, error).type() != fs::file_type::not_found)
+    return;
+  const std::string meant = nearest_file(given);
+  if (meant.empty()) return;  // its reader says that it is missing
+  throw InputError(given, "", "no such file or folder; did you mean " + shell_word(meant) + "?");
+}
+
+// Of `simulate`, which wrote the recording beside it.
+void refuse_truth(const fs::path& folder) {
+  std::error_code ignored;
+  if (!fs::exists(folder / "site.yaml", ignored) || !fs::exists(folder / "trees.csv", ignored))
+    return;
+  std::string beside;
+  for (const char* ending : {".mcap", ".pcap"}) {
+    fs::path recording = folder.has_filename() ? folder : folder.parent_path();
+    recording.replace_extension(ending);
+    if (fs::is_regular_file(recording, ignored)) beside = recording.string();
+  }
+  throw InputError(folder.string(), "",
+                   "holds the truth of a simulated recording, and no scans" +
+                       (beside.empty() ? "" : ": the recording is " + shell_word(beside)));
+}
+
 }  // namespace
 
 void refuse_run(const std::string& recording) {
   std::error_code ignored;
+  refuse_missing(recording);
   if (!fs::is_directory(recording, ignored)) return;
+  refuse_truth(recording);
   const bool unfinished = holds_unfinished_run(recording);
   if (!unfinished && !RunJson(recording).is_ours()) return;
   const fs::path cloud = fs::path(recording) / "map.laz";
   const bool has_cloud = fs::exists(cloud, ignored);
   std::string advice;
   if (has_cloud)
-    advice = "`understory inventory " + (unfinished ? cloud.string() : recording) +
+    advice = "`understory inventory " + shell_word(unfinished ? cloud.string() : recording) +
              " -o DIR` measures the trees of its map";
   else if (!unfinished)
     advice = "its results and the recording that it was made of stand in " +
              (fs::path(recording) / RunJson::kName).string();
   if (unfinished)
-    advice += (advice.empty() ? "" : ", ") +
-              ("`understory map --resume " + recording + "` goes on with it");
+    advice +=
+        (advice.empty() ? "" : ", ") + ("`" + resume_command(recording) + "` goes on with it");
   throw InputError(recording, "", "is the folder of a run, no recording: " + advice);
 }
 
@@ -104,46 +160,51 @@ std::string nearest_word(const std::string& given, const std::vector<std::string
 
 void refuse_cloud(const std::string& recording) {
   std::error_code ignored;
+  refuse_run(recording);
   if (fs::is_directory(recording, ignored)) {
-    refuse_run(recording);
     const std::string cloud = single_cloud(recording);
     if (cloud.empty()) return;
     throw InputError(recording, "",
                      "holds one point cloud, and a map is made of many: `understory inventory " +
-                         cloud + " -o DIR` measures its trees");
+                         shell_word(cloud) + " -o DIR` measures its trees");
   }
   if (!fs::is_regular_file(recording, ignored) || !has_map_name(recording)) return;
   throw InputError(
       recording, "",
-      "is one point cloud, and a map is made of many: `understory inventory " + recording +
+      "is one point cloud, and a map is made of many: `understory inventory " +
+          shell_word(recording) +
           " -o DIR` measures its trees, `understory map FOLDER` maps a folder of clouds");
 }
 
 void refuse_recording(const std::string& cloud) {
   std::error_code ignored;
+  refuse_missing(cloud);
   const bool folder = fs::is_directory(cloud, ignored) && !fs::exists(fs::path(cloud) / "map.laz");
   if (!folder && !names_recording(cloud)) return;
   throw InputError(cloud, "",
                    folder
                        ? "expected a point cloud, or a run folder with a map.laz in it; a folder "
                          "of clouds or a bag is mapped first: `understory map " +
-                             cloud + " -o RUN`"
+                             shell_word(cloud) + " -o RUN`"
                        : "is a recording, no point cloud: map it first with `understory map " +
-                             cloud + " -o RUN`, then give RUN");
+                             shell_word(cloud) + " -o RUN`, then give RUN");
+}
+
+bool is_stems_name(const std::string& file) {
+  return ends_with_one_of(file, {"stems.csv.gz", "stems.csv"});
 }
 
 void refuse_stems(const std::string& recording) {
   std::error_code ignored;
-  if (!ends_with_one_of(recording, {"stems.csv.gz", "stems.csv"}) ||
-      !fs::is_regular_file(recording, ignored))
-    return;
+  if (!is_stems_name(recording) || !fs::is_regular_file(recording, ignored)) return;
   throw InputError(recording, "",
-                   "holds the stems of a recording, no scans: `understory correct " + recording +
-                       " -o DIR` maps them");
+                   "holds the stems of a recording, no scans: `understory correct " +
+                       shell_word(recording) + " -o DIR` maps them");
 }
 
 void refuse_folder(const std::string& cloud) {
   std::error_code ignored;
+  refuse_missing(cloud);
   if (!fs::is_directory(cloud, ignored)) return;
   const fs::path map = fs::path(cloud) / "map.laz";
   throw InputError(cloud, "",
@@ -151,12 +212,28 @@ void refuse_folder(const std::string& cloud) {
                        (fs::exists(map, ignored) ? ", for instance " + map.string() : ""));
 }
 
+void refuse_lists_of_trees(const std::string& estimate, const std::string& truth) {
+  for (const std::string& given : {estimate, truth}) {
+    std::error_code ignored;
+    const bool folder = fs::is_directory(given, ignored);
+    const bool list = folder ? fs::exists(fs::path(given) / "trees.csv", ignored) &&
+                                   !fs::exists(fs::path(given) / "trajectory.tum", ignored)
+                             : fs::path(given).filename() == "trees.csv";
+    if (!list) continue;
+    throw InputError(given, "",
+                     std::string(folder ? "holds" : "is") +
+                         " a list of trees and no path: `understory evaluate trees " +
+                         shell_word(estimate) + " " + shell_word(truth) + "` compares lists");
+  }
+}
+
 void refuse_unmapped(const std::string& given, const std::string& options) {
   std::error_code ignored;
+  refuse_missing(given);
   if (!names_recording(given) || fs::is_directory(given, ignored)) return;
   throw InputError(given, "",
-                   "is a recording: map it first with `understory map " + given + " -o RUN" +
-                       options + "`, then give RUN");
+                   "is a recording: map it first with `understory map " + shell_word(given) +
+                       " -o RUN" + options + "`, then give RUN");
 }
 
 }  // namespace understory

@@ -234,6 +234,7 @@ std::string run_json(const RunSummary& summary) {
   }
   json["command"] = summary.command;
   json["version"] = summary.version;
+  json["format"] = kRunFormat;
   json["scans"] = summary.scans;
   json["poses"] = summary.poses;
   json["recording_s"] = number(summary.recording_s);

@@ -106,6 +106,10 @@ struct ImuCalibrationFigures {
   double used_late_s = 0.0;        // lateness that it was mapped with
 };
 
+// Of run.json and the files that it lists. It rises where an older version of the program would
+// read them wrong, and that version then refuses them.
+inline constexpr int kRunFormat = 1;
+
 // What run.json says. Warnings are one per kind. A command makes it with RunDocuments
 // (pipeline/run_folder/run_documents.h), which fills in what all commands have in common.
 struct RunSummary {

@@ -101,7 +101,6 @@ void position_views(const CorrectionRequest& request, const ProgressSink& progre
     begin_from(request.stems / "trajectory.tum", input, documents);
   input.stopped = input.steps.size() < input.views.size();
   input.evidence.stopped = input.stopped;
-  input.evidence.resumable = false;
   input.views.resize(input.steps.size());
   documents.report().made_from = fmt::format("stems of {} views", input.views.size());
   input.scan_ms.assign(input.views.size(), 0.0F);

@@ -116,7 +116,7 @@ struct StandEvidence {
 struct RunEvidence {
   bool by_stems = false;            // which front end
   bool stopped = false;             // before the end of the recording
-  bool resumable = true;            // the command that was stopped can go on from there
+  std::string goes_on_by;           // command that goes on with it; empty: it is begun anew
   std::string unreadable;           // why it could not be read to its end; else the user stopped
   std::uint64_t dropped_scans = 0;  // --realtime: the machine could not keep up
   SensorEvidence lidar;

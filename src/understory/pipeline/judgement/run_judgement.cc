@@ -59,11 +59,12 @@ class Judge {
   void judge_ending() {
     if (!evidence_.unreadable.empty()) {
       missing("the recording could not be read any further: " + evidence_.unreadable +
-              "; once it can be, go on with `understory map --resume RUN`");
+              "; once it can be, go on with `" + evidence_.goes_on_by + "`");
     } else if (evidence_.stopped) {
       const std::string stopped = "stopped by the user before the end of the recording";
-      missing(stopped + (evidence_.resumable ? "; go on with `understory map --resume RUN`"
-                                             : "; run the command again for the whole of it"));
+      missing(stopped + (evidence_.goes_on_by.empty()
+                             ? "; run the command again for the whole of it"
+                             : "; go on with `" + evidence_.goes_on_by + "`"));
     }
     if (evidence_.cut_off) {
       missing("the recording is cut off, and the rest is missing: " + evidence_.where_cut_off);

@@ -188,10 +188,9 @@ TEST(RunJudgement, SensorsWithoutASay) {
 TEST(RunJudgement, WhatIsMissingIsPartialAndWhatIsWrongIsUntrusted) {
   RunEvidence evidence = good_run();
   evidence.stopped = true;
-  evidence.resumable = false;
   expect(RunStatus::kPartial, "run the command again", evidence);
-  evidence.resumable = true;
-  expect(RunStatus::kPartial, "understory map --resume", evidence);
+  evidence.goes_on_by = "understory map --resume 'my plot'";
+  expect(RunStatus::kPartial, "go on with `understory map --resume 'my plot'`", evidence);
   evidence.match.unmatched = 100;
   EXPECT_EQ(judged(evidence).status, RunStatus::kUntrusted);
   EXPECT_EQ(judged(evidence).reasons.size(), 2U);

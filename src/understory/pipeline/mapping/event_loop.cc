@@ -278,6 +278,7 @@ RunFacts EventLoop::facts() {
   RunFacts facts;
   facts.stopped = stopped_;
   facts.unreadable = unreadable_;
+  facts.goes_on_by = resume_command(state_.folder().path());
   facts.elapsed_s = [this] { return state_.elapsed_s(); };
   facts.format = source_->format();
   facts.time_repair = orderer_->report();

@@ -15,6 +15,7 @@ class OnlinePath;
 struct RunFacts {
   bool stopped = false;    // before the end of the recording
   std::string unreadable;  // why the recording could not be read to its end; else the user stopped
+  std::string goes_on_by;  // the command that goes on with the run
   std::function<double()> elapsed_s;  // seconds that the run has taken so far
   std::string format;                 // of the recording
   EventOrderer::Report time_repair;

@@ -69,9 +69,9 @@ void refuse_foreign_results(const fs::path& folder) {
 
 void refuse_runs(const fs::path& folder) {
   if (holds_unfinished_run(folder))
-    throw RefusedOutput(folder.string(),
-                        "holds an unfinished run; go on with `understory map --resume " +
-                            folder.string() + "` or give --overwrite to start anew");
+    throw RefusedOutput(folder.string(), "holds an unfinished run; go on with `" +
+                                             resume_command(folder) +
+                                             "` or give --overwrite to start anew");
   if (former_results(folder).present)
     throw RefusedOutput(folder.string(),
                         "holds the results of a run: give --overwrite to replace them, or name "

@@ -13,6 +13,7 @@
 #include "understory/util/files/atomic_file.h"
 #include "understory/util/files/durable.h"
 #include "understory/util/files/output_guard.h"
+#include "understory/util/shell_word.h"
 #include "understory/util/version.h"
 
 namespace understory {
@@ -62,6 +63,18 @@ int format_of(const fs::path& marker) {
   return file >> key >> format && key == "format:" ? format : 0;
 }
 
+// The same of a work folder, which is no link.
+int format_of_work(const fs::path& work) {
+  std::error_code error;
+  return fs::is_directory(fs::symlink_status(work, error)) ? format_of(work / kMarker) : 0;
+}
+
+std::string newer_work(int format) {
+  return fmt::format(
+      "holds a run of a newer version (its work folder has format {}, this version knows {})",
+      format, kFormat);
+}
+
 // A process that was stopped before it could leave a marker has left this at most.
 bool holds_nothing_yet(const fs::path& work) {
   for (const fs::path& entry : entries_of(work)) {
@@ -96,18 +109,22 @@ bool holds_unfinished_run(const fs::path& run_folder) {
   return format_of(work / kMarker) > 0 && holds_state(work);
 }
 
+std::string resume_command(const fs::path& run_folder) {
+  return "understory map --resume " + shell_word(run_folder.string());
+}
+
+void refuse_newer_work(const fs::path& folder) {
+  const int format = format_of_work(work_folder_of(folder));
+  if (format > kFormat) throw InputError(folder.string(), "", newer_work(format));
+}
+
 void refuse_foreign_work(const fs::path& folder) {
   const fs::path work = work_folder_of(folder);
   if (!is_there(work)) return;
   std::error_code error;
   const bool is_folder = fs::is_directory(fs::symlink_status(work, error));
-  const int format = is_folder ? format_of(work / kMarker) : 0;
-  if (format > kFormat)
-    throw RefusedOutput(
-        folder.string(),
-        fmt::format("holds a run of a newer version (its work folder has format {}, "
-                    "this version knows {})",
-                    format, kFormat));
+  const int format = format_of_work(work);
+  if (format > kFormat) throw RefusedOutput(folder.string(), newer_work(format));
   if (format > 0 || (is_folder && holds_nothing_yet(work))) return;
   throw RefusedOutput(work.string(),
                       "is not of this program's making: name another folder for the output");

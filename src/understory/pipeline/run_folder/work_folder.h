@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 namespace understory {
 
@@ -23,9 +24,13 @@ namespace understory {
 
 // Whether the folder holds a mapping run that `--resume` goes on with.
 [[nodiscard]] bool holds_unfinished_run(const std::filesystem::path& run_folder);
+// The command that goes on with it, as a user types it.
+[[nodiscard]] std::string resume_command(const std::filesystem::path& run_folder);
 
 // OutputError if the folder holds a work folder that is not of this program, or of a newer version.
 void refuse_foreign_work(const std::filesystem::path& run_folder);
+// The same for who only reads there: InputError if a newer version of the program is at work in it.
+void refuse_newer_work(const std::filesystem::path& run_folder);
 
 // Writes the marker if there is none. Throws OutputError.
 void leave_marker(const std::filesystem::path& work);

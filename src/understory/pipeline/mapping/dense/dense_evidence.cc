@@ -21,6 +21,7 @@ void gather_dense(const DenseFrontEnd& front_end, const RunFacts& facts, const R
   gather_reading(reading, evidence);
   evidence.stopped = facts.stopped;
   evidence.unreadable = facts.unreadable;
+  evidence.goes_on_by = facts.goes_on_by;
   evidence.dropped_scans = facts.dropped_scans;
   evidence.imu_used = front_end.odometry().uses_imu();
   const ImuTrust trust = front_end.odometry().motion().imu_trust();

@@ -38,6 +38,7 @@ void gather_sparse(const SparseFrontEnd& front_end, const RunFacts& facts, const
   gather_reading(reading, evidence);
   evidence.stopped = facts.stopped;
   evidence.unreadable = facts.unreadable;
+  evidence.goes_on_by = facts.goes_on_by;
   evidence.dropped_scans = facts.dropped_scans;
   const ImuTrust trust = front_end.imu_trust();
   const std::string& refused = front_end.imu_refused();
