@@ -5,6 +5,7 @@ import csv
 import json
 import math
 import random
+import re
 
 import laspy
 import numpy as np
@@ -230,11 +231,24 @@ def two_frames(folder):
     a = write_list(folder / "a.csv", first)
     b = write_list(folder / "b.csv", [(x + 7.3, y - 4.1, *rest) for x, y, *rest in second])
     done = program("evaluate", "trees", a, b)
-    assert done.returncode == 0 and "few match           --align yaw" in done.stdout, done
-    assert "few match" not in program("evaluate", "trees", a, b, "--align", "yaw").stdout
-    assert "few match" not in program("evaluate", "trees", a, a).stdout
+    assert done.returncode == 4 and "of 40 trees match: A and B may lie in different frames. --align yaw" in done.stderr, done
+    assert "[evaluate.trees]" in done.stderr, done
+    done = program("evaluate", "trees", a, b, "--json")  # the figures are told all the same
+    assert done.returncode == 4 and json.loads(done.stdout)["trees_a"] == 40, done
+    for words in ((a, b, "--align", "yaw"), (a, a)):
+        done = program("evaluate", "trees", *words)
+        assert done.returncode == 0 and "trees match" not in done.stderr, done
+        assert "bias 0.0000 m in x" in done.stdout and not re.search(r"[-+]0\.0+\b", done.stdout), done.stdout
     other = write_list(folder / "c.csv", two_lists(99)[0])
-    return program("evaluate", "trees", a, other, "--align", "yaw").stdout.splitlines()[2]
+    done = program("evaluate", "trees", a, other, "--align", "yaw")
+    assert done.returncode == 4 and "may show different stands" in done.stderr, done
+    few = write_list(folder / "d.csv", [(x + 500, y, *rest) for x, y, *rest in first[:3]])
+    done = program("evaluate", "trees", few, a)
+    assert done.returncode == 4 and "only 0 of 3 trees match" in done.stderr, done
+    few.write_text("id,x,y\n")
+    done = program("evaluate", "trees", few, a)
+    assert done.returncode == 0, done  # an empty list has no frame
+    return done.stdout.splitlines()[1]
 
 
 @cases.case("diameters in another unit")

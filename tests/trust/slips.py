@@ -8,6 +8,7 @@ import os
 import pty
 import random
 import re
+import shlex
 import struct
 import subprocess
 import sys
@@ -100,6 +101,33 @@ def missing(folder):
         assert not gone.exists() and not (folder / "run").exists()
 
 
+@cases.case("a name that is nearly right is proposed")
+def nearly(folder):
+    walk, plot = folder / "my walk.mcap", folder / "plot.ply"
+    for made in (walk, plot):
+        made.write_bytes(b"nothing")
+    out = folder / "run"
+    for words, meant in ((("map", folder / "my walk", "-o", out), walk), (("info", folder / "my wlak.mcap"), walk),
+                         (("inventory", folder / "plot", "-o", out), plot), (("register", folder / "plto.ply", plot), plot),
+                         (("evaluate", folder / "my walk", plot), walk), (("convert", folder / "my walk.map", out), walk)):
+        done = program(*words)
+        assert done.returncode == 3 and f"no such file or folder; did you mean {shlex.quote(str(meant))}?" in done.stderr, done
+    done = program("map", folder / "forest.mcap", "-o", out)
+    assert done.returncode == 3 and "did you mean" not in done.stderr, done
+
+
+@cases.case("the truth beside a recording is no recording")
+def truth_for_recording(folder):
+    walk, truth = folder / "walk.mcap", folder / "walk.truth"
+    truth.mkdir()
+    walk.write_bytes(b"nothing")
+    for name in ("site.yaml", "trees.csv", "trajectory.tum"):
+        (truth / name).write_text("x\n")
+    for words in (("map", truth, "-o", folder / "run"), ("info", truth), ("convert", truth, folder / "out")):
+        done = program(*words)
+        assert done.returncode == 3 and f"and no scans: the recording is {walk}" in done.stderr, done
+
+
 @cases.case("map of a cloud and inventory of a recording point to each other")
 def other_way(folder):
     cloud = folder / "plot.ply"
@@ -122,7 +150,50 @@ def other_way(folder):
         assert done.returncode == 3 and f"understory map {recording}" in done.stderr, done
 
 
+@cases.case("evaluate of a list of trees names the command that compares lists")
+def lists_for_paths(folder):
+    plot, truth = folder / "my plot", folder / "truth"
+    for made, path in ((plot, None), (truth, "100.0 0 0 0 0 0 0 1\n")):
+        made.mkdir()
+        (made / "trees.csv").write_text("id,x,y,dbh_m\n1,2,3,0.2\n")
+        if path:
+            (made / "trajectory.tum").write_text(path)
+    for given in (plot, plot / "trees.csv"):
+        for words in ((given, truth), (truth, given)):
+            done = program("evaluate", *words)
+            advice = f"understory evaluate trees {' '.join(shlex.quote(str(word)) for word in words)}"
+            assert done.returncode == 3 and f"`{advice}` compares lists" in done.stderr, done
+            assert program(*shlex.split(advice)[1:]).returncode == 0
+
+
 GOOD, MESSAGES, TRUTH = good_recording(seconds=6, more=SMALL_STAND)
+
+
+@cases.case("paths in two frames are told so")
+def two_frames(folder):
+    turned = folder / "turned.tum"
+    with open(TRUTH / "trajectory.tum") as file:
+        rows = [line.split() for line in file]
+    turned.write_text("".join(f"{t} {-float(y) + 40} {x} {z} 0 0 0 1\n" for t, x, y, z, *_ in rows))
+    done = program("evaluate", turned, TRUTH)
+    assert done.returncode == 0 and "their frames may differ. --align se3" in done.stderr, done
+    for words in ((turned, TRUTH, "--align", "se3"), (TRUTH, TRUTH)):
+        done = program("evaluate", *words)
+        assert done.returncode == 0 and "frames may differ" not in done.stderr, done
+
+
+@cases.case("how sharp a map by stems is, by its folder or its stems alone")
+def sharp_stems(folder):
+    run = folder / "run"
+    assert program("map", GOOD, "-o", run, "--front-end", "sparse").returncode in (0, 4)
+    both = program("evaluate", "map", run / "stems.csv.gz", run / "trajectory.tum")
+    assert both.returncode == 0 and "blurred area" in both.stdout, both
+    for given in (run, run / "stems.csv.gz"):
+        assert program("evaluate", "map", given).stdout == both.stdout
+    alone = folder / "stems.csv.gz"
+    alone.write_bytes((run / "stems.csv.gz").read_bytes())
+    done = program("evaluate", "map", alone)
+    assert done.returncode == 3 and f"understory evaluate map {alone} TRAJECTORY" in done.stderr, done
 
 
 @cases.case("sensors that the extrinsics put tens of metres apart")

@@ -6,6 +6,7 @@
 
 #include "understory/cli/command.h"
 #include "understory/cli/outcome.h"
+#include "understory/cli/suggestion.h"
 #include "understory/pipeline/georeferencing/georeferencing.h"
 #include "understory/pipeline/georeferencing/methods/placement_methods.h"
 #include "understory/util/error.h"
@@ -96,6 +97,7 @@ void check(const GeoreferenceOptions& options) {
 
 int run_georeference(const GeoreferenceOptions& options, CommandContext& context) {
   check(options);
+  refuse_unmapped(options.run);
   GeoreferenceRequest request;
   request.run = options.run;
   request.result = options.result;

@@ -177,6 +177,22 @@ void warn_of_doubts(const TrajectoryErrors& errors, Log& log) {
     log.warn("evaluate.alignment", note);
 }
 
+// Of paths as they lie: errors of metres that a motion of the whole path takes away.
+void warn_of_frames(const Trajectory& estimate, const Trajectory& truth, EvaluationOptions settings,
+                    const TrajectoryErrors& errors, Log& log) {
+  constexpr double kApartM = 1.0;  // less is an error of the place on the globe [chosen]
+  constexpr double kLeft = 0.1;    // share of the error that is left once moved [chosen]
+  if (errors.alignment != Alignment::kNone || errors.ape_rmse_m < kApartM) return;
+  settings.alignment = Alignment::kSe3;
+  const auto moved = evaluate_trajectory(estimate, truth, settings);
+  if (!moved || moved->ape_rmse_m > kLeft * errors.ape_rmse_m) return;
+  log.warn(
+      "evaluate.frames",
+      fmt::format("the paths lie {:.2f} m apart as they are, and {:.3f} m once the estimate is "
+                  "moved as a whole: their frames may differ. --align se3 moves it first",
+                  errors.ape_rmse_m, moved->ape_rmse_m));
+}
+
 Json to_json(const PrismErrors& errors) {
   Json json;
   json["pairs"] = errors.pairs;
@@ -233,6 +249,7 @@ int evaluate(const EvaluateOptions& options, CommandContext& context) {
   }
   for (const std::string& path : {options.estimate, options.truth})
     refuse_unmapped(path);
+  refuse_lists_of_trees(options.estimate, options.truth);
   if (!options.prism_m.empty()) return evaluate_places(options, context);
   EvaluationOptions settings;
   settings.alignment = alignment_from_name(options.alignment);
@@ -257,6 +274,7 @@ int evaluate(const EvaluateOptions& options, CommandContext& context) {
                              velocities_beside(options.truth, context.log),
                              errors->truth_from_estimate.rotation(), options.tolerance_s);
   warn_of_doubts(*errors, context.log);
+  warn_of_frames(estimate, truth, settings, *errors, context.log);
   const std::string text = options.json ? to_json(*errors, velocity).dump(2) + "\n"
                                         : to_text(*errors, velocity, options.tolerance_s);
   std::fputs(text.c_str(), stdout);

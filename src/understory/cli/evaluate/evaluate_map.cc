@@ -6,8 +6,10 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "understory/cli/evaluate/evaluate_crispness.h"
 #include "understory/cli/suggestion.h"
@@ -18,6 +20,7 @@
 #include "understory/recording/clouds/stems_file.h"
 #include "understory/util/error.h"
 #include "understory/util/files/file_in_folder.h"
+#include "understory/util/shell_word.h"
 
 namespace understory {
 namespace {
@@ -155,6 +158,26 @@ int evaluate_map(const EvaluateMapOptions& options, CommandContext& context) {
   return placed.without > placed.views.size() ? kExitUntrusted : kExitDone;
 }
 
+// A run by stems has no cloud: its stems are placed by its own path. So is a file of stems that
+// lies beside a path.
+void place_by_own_path(EvaluateMapOptions& options) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  if (!options.trajectory.empty()) return;
+  const fs::path given(options.stems);
+  const bool folder = fs::is_directory(given, ignored);
+  const bool stems = folder ? !fs::exists(given / "map.laz", ignored) &&
+                                  fs::exists(given / "stems.csv.gz", ignored)
+                            : is_stems_name(options.stems);
+  if (!stems) return;
+  const fs::path path = (folder ? given : given.parent_path()) / "trajectory.tum";
+  if (!fs::exists(path, ignored))
+    throw InputError(options.stems, "",
+                     "holds stems, which a trajectory places: `understory evaluate map " +
+                         shell_word(options.stems) + " TRAJECTORY`");
+  options.trajectory = path.string();
+}
+
 }  // namespace
 
 void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
@@ -163,10 +186,12 @@ void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
   const auto options = std::make_shared<EvaluateMapOptions>();
   command
       ->add_option("RUN", options->stems,
-                   "Run folder or cloud (.laz, .las); with TRAJECTORY the stems of the views "
-                   "(stems.csv.gz), or a run folder that holds them")
+                   "Run folder, cloud (.laz, .las), or the stems of the views (stems.csv.gz)")
       ->required();
-  command->add_option("TRAJECTORY", options->trajectory, "Run folder or trajectory (TUM)");
+  command->add_option(
+      "TRAJECTORY", options->trajectory,
+      "Of stems: the run folder or trajectory (TUM) that places them, their own if not "
+      "given");
   command
       ->add_option("--thin-m", options->entropy.thin_m,
                    "Of a cloud: one point counts in each cube of this edge, so that maps of other "
@@ -190,6 +215,7 @@ void add_evaluate_map_command(CLI::App& evaluate, Command& chosen) {
     chosen = [options](CommandContext& context) {
       refuse_unmapped(options->stems);
       context.stop_at_once();
+      place_by_own_path(*options);
       return options->trajectory.empty()
                  ? evaluate_crispness(options->stems, options->entropy, options->json, context)
                  : evaluate_map(*options, context);

@@ -97,7 +97,9 @@ int evaluate_trees(const TreeOptions& options, CommandContext& context) {
   const std::string text = options.json ? comparison_json(result, options).dump(2) + "\n"
                                         : comparison_text(result, options);
   std::fputs(text.c_str(), stdout);
-  return aligned && in_metres ? kExitDone : kExitUntrusted;
+  const std::string few = few_pairs_complaint(result.all, options);
+  if (aligned && !few.empty()) context.log.warn("evaluate.trees", few);
+  return aligned && in_metres && few.empty() ? kExitDone : kExitUntrusted;
 }
 
 void add_path_options(CLI::App& command, TreeOptions& options) {

@@ -12,6 +12,9 @@
 namespace understory {
 namespace {
 
+// With fewer trees a third of them is chance [chosen]
+constexpr std::size_t kFewestTrees = 5;
+
 // RMSE and bias, A minus B; null where no pair tells.
 void add_differences(nlohmann::ordered_json& json, const TreeErrors& e) {
   json["position_rmse_m"] = e.position_rmse_m;
@@ -156,15 +159,15 @@ nlohmann::ordered_json comparison_json(const TreeComparison& result, const TreeO
   return json;
 }
 
-// What to try where most trees found no partner; empty else.
-std::string few_pairs_text(const TreeErrors& errors, const TreeOptions& options) {
-  constexpr std::size_t kFewestTrees = 5;
+std::string few_pairs_complaint(const TreeErrors& errors, const TreeOptions& options) {
   const std::size_t fewer = std::min(errors.trees_a, errors.trees_b);
-  if (fewer < kFewestTrees || 3 * errors.matched >= fewer) return "";
-  return options.alignment == "none" ? "few match           --align yaw moves A onto B first, "
-                                       "--radius-m pairs trees farther "
-                                       "apart\n"
-                                     : "few match           the lists may show different stands\n";
+  const bool few = fewer < kFewestTrees ? errors.matched == 0 : 3 * errors.matched < fewer;
+  if (fewer == 0 || !few) return "";
+  return fmt::format("only {} of {} trees match{}", errors.matched, fewer,
+                     options.alignment == "none"
+                         ? ": A and B may lie in different frames. --align yaw moves A onto B "
+                           "first, --radius-m pairs trees farther apart"
+                         : ", also where A was moved: the lists may show different stands");
 }
 
 std::string comparison_text(const TreeComparison& result, const TreeOptions& options) {
@@ -175,7 +178,7 @@ std::string comparison_text(const TreeComparison& result, const TreeOptions& opt
       options.alignment + (result.b_from_a ? ": moved by " + motion_text(*result.b_from_a) : ""),
       e.trees_a, e.trees_b, e.matched, options.assignment.radius_m,
       options.matching == "optimal" ? "best in position and diameter together" : "nearest first");
-  text += few_pairs_text(e, options) + figures_text(e) + classes_text(result.by_diameter);
+  text += figures_text(e) + classes_text(result.by_diameter);
   if (result.visible) {
     const VisibleTreeErrors& v = *result.visible;
     text += fmt::format(

@@ -46,6 +46,9 @@ struct TreeComparison {
 // As one JSON object; NaN becomes null.
 [[nodiscard]] nlohmann::ordered_json comparison_json(const TreeComparison& result,
                                                      const TreeOptions& options);
+// Why the figures mean little, and what to try, where fewer than a third of the shorter list found
+// a partner, or none. Empty else.
+[[nodiscard]] std::string few_pairs_complaint(const TreeErrors& errors, const TreeOptions& options);
 // As lines for a terminal; what no tree tells is left out.
 [[nodiscard]] std::string comparison_text(const TreeComparison& result, const TreeOptions& options);
 

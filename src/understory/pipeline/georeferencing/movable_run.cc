@@ -39,7 +39,12 @@ void copy_unmoved(const fs::path& from, const fs::path& to) {
 
 MovableRun read_movable_run(const fs::path& folder) {
   if (!fs::is_directory(folder) || !fs::exists(folder / "trajectory.tum"))
-    throw InputError(folder.string(), "", "expected a run folder that holds trajectory.tum");
+    throw InputError(folder.string(), "",
+                     std::string("expected a run folder that holds trajectory.tum") +
+                         (fs::exists(folder / "trees.csv")
+                              ? ": this one has trees and no path. Move the run that it was made "
+                                "of, then take its inventory"
+                              : ""));
   MovableRun run;
   run.world_frame = world_frame_of_run(folder);
   run.trajectory = read_trajectory(folder / "trajectory.tum");

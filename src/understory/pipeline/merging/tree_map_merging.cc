@@ -190,7 +190,8 @@ void judge(const MergeRequest& request, const Merge& m, RunDocuments& documents)
                     "no tree of one map lies near one of the other: they may have different world "
                     "frames (--align)");
   } else if (const std::string complaint = chance_complaint(m.chance); !complaint.empty()) {
-    documents.lower(RunStatus::kUntrusted, complaint);
+    const char* frames = ", or in different frames: --align lays one on the other first";
+    documents.lower(RunStatus::kUntrusted, complaint + (request.align ? "" : frames));
   }
   if (m.same)
     documents.lower(RunStatus::kUntrusted,
