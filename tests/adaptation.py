@@ -54,7 +54,7 @@ def _(folder):
     told = changes(run)
     assert asked[VOXEL] == 0.4 and ran[VOXEL] == 0.1, (asked[VOXEL], ran[VOXEL])
     assert (told[VOXEL]["from"], told[VOXEL]["to"], told[VOXEL]["when_s"]) == (0.4, 0.1, 0)
-    assert "sparse scans" in told[VOXEL]["why"], told[VOXEL]
+    assert "points a scan of 16 rings, fewer than run.sparse_scan_points (60000)" in told[VOXEL]["why"], told[VOXEL]
     assert {key for key in asked if asked[key] != ran[key]} == set(told)
     assert all(asked[key] == told[key]["from"] and ran[key] == told[key]["to"] for key in told)
     assert run["config_origins"] == {"map.enabled": "--set"}, run["config_origins"]

@@ -128,6 +128,9 @@ inline constexpr double kSparse = 20.0;
 // Of all points, those near breast height: a sparse cloud with a smaller share was taken from above
 // [real clouds: 0.025 and 0.06 from aeroplanes]
 inline constexpr double kFromAboveShare = 0.12;
+// Share of the area where a cloud is dense: from here on the cloud is not called sparse [chosen:
+// a walk of 12 s in the open has 0.42]
+inline constexpr double kDenseShare = 0.2;
 // Share of the cells of the terrain that were seen: with less it is said [not recorded]
 inline constexpr double kLeastMeasured = 0.2;
 }  // namespace inventory

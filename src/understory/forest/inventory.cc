@@ -1,7 +1,5 @@
 #include "understory/forest/inventory.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,7 +11,7 @@
 #include "understory/forest/forest_constants.h"
 #include "understory/forest/form/shared_feet.h"
 #include "understory/forest/ground/uphill_side.h"
-#include "understory/forest/stems/blurred_stems.h"
+#include "understory/forest/inventory_remarks.h"
 #include "understory/forest/stems/stem_axis.h"
 #include "understory/forest/tiles/stem_tiles.h"
 #include "understory/forest/trees/double_images.h"
@@ -161,10 +159,10 @@ double canopy_height(const Raster& canopy) {
   return *middle;
 }
 
-// Whether the scanner was below the canopy, at more than half of its places. World frame. A place
-// without ground below does not count as such.
-bool below_canopy(const std::vector<Eigen::Vector3d>& scanner, const InventoryResult& result) {
-  const double canopy_m = canopy_height(result.canopy);
+// Whether the scanner was below a canopy of that height, at more than half of its places. World
+// frame. A place without ground below does not count as such.
+bool below_canopy(const std::vector<Eigen::Vector3d>& scanner, double canopy_m,
+                  const InventoryResult& result) {
   std::size_t below = 0;
   for (const Eigen::Vector3d& place : scanner) {
     const double ground = result.ground.terrain.interpolate(place.x(), place.y());
@@ -177,9 +175,14 @@ void judge_density(const StemHarvest& gathered, const std::vector<Eigen::Vector3
                    InventoryResult& result) {
   const auto returns = static_cast<double>(gathered.near_breast);
   result.too_sparse = returns < kSparse * std::max(1.0, result.area_m2);
-  result.from_above = result.too_sparse &&
-                      returns < kFromAboveShare * static_cast<double>(result.points) &&
-                      !below_canopy(scanner, result);
+  const bool few_low =
+      result.too_sparse && returns < kFromAboveShare * static_cast<double>(result.points);
+  const double canopy_m = canopy_height(result.canopy);
+  const bool below = below_canopy(scanner, canopy_m, result);
+  result.from_above = few_low && !below;
+  result.open_land = few_low && (below || canopy_m == 0.0) &&
+                     result.thin.dense_share >= kDenseShare &&
+                     result.thin.near_breast_per_m2 < kSparse;
   if (result.from_above) result.thin = {};  // no stem is looked for there
 }
 
@@ -227,60 +230,6 @@ void add_crowns(const InventoryConfig& config, InventoryResult& result) {
     tree.crown_area_m2 = crown.area_m2;
     result.crown_ids.back() = tree.id;
     result.trees.push_back(tree);
-  }
-}
-
-void remark_on_stems(const StemHarvest& gathered, const InventoryConfig& config,
-                     InventoryResult& result) {
-  const double area_m2 = std::max(1.0, result.area_m2);
-  const double per_m2 = static_cast<double>(gathered.points) / area_m2;
-  const std::uint64_t returns = gathered.near_breast;
-  const double near_breast = static_cast<double>(returns) / area_m2;
-  const std::size_t by_crown = result.trees.size() - result.stems.size();
-  if (gathered.blur_m > 0.0)
-    result.remarks.push_back(blur_remark(gathered.blur_m, gathered.range_noise_m));
-  if (by_crown > 0)
-    result.remarks.push_back(fmt::format(
-        "{} trees were found by their crowns alone ({:.1f} returns per square metre lie between {} "
-        "and {} m above the ground, {:.0f} at all heights). They have no diameter. Trees below "
-        "other crowns are not in the list.",
-        by_crown, near_breast, config.stems.lowest_m, config.stems.highest_m, per_m2));
-  if (by_crown > 0 && result.from_above) return;
-  if (returns == 0) {
-    result.remarks.push_back(fmt::format(
-        "No point lies between {} and {} m above the lowest points. The ground below the trees is "
-        "missing from the cloud, or the cloud is a cut at another height.",
-        config.stems.lowest_m, config.stems.highest_m));
-  } else if (result.too_sparse) {
-    result.remarks.push_back(fmt::format(
-        "Only {:.1f} returns per square metre lie between {} and {} m above the ground ({:.0f} of "
-        "all heights): too few to see stems reliably. Trees are missing from the list; the terrain "
-        "and canopy models are not affected.",
-        near_breast, config.stems.lowest_m, config.stems.highest_m, per_m2));
-  }
-}
-
-void remark(const StemHarvest& gathered, const InventoryConfig& config, InventoryResult& result) {
-  remark_on_stems(gathered, config, result);
-  if (result.ground.measured_share < kLeastMeasured) {
-    result.remarks.push_back(fmt::format(
-        "Ground was seen in only {:.0f} % of the terrain model's cells; between them it is "
-        "interpolated{}.",
-        100.0 * result.ground.measured_share,
-        result.stems.empty() ? "" : ", and with it the height at which diameters are taken"));
-  }
-  if (gathered.without_ground * 50 > gathered.points) {
-    result.remarks.push_back(fmt::format(
-        "{:.0f} % of the points lie where no ground was seen within {} m; they were left out.",
-        100.0 * static_cast<double>(gathered.without_ground) / static_cast<double>(gathered.points),
-        config.ground.max_gap_m));
-  }
-  std::size_t no_top = 0;
-  for (const Tree& tree : result.trees)
-    no_top += std::isnan(tree.height_m) ? 1 : 0;
-  if (no_top > 0) {
-    result.remarks.push_back(fmt::format("{} of {} trees have no height: their tops were not seen.",
-                                         no_top, result.trees.size()));
   }
 }
 
@@ -444,7 +393,7 @@ InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& c
   compensate_beams(config.beam, scanner, result);
   result.thin = gathered.coverage.thin();
   measure_above(cloud, config, progress, {lookouts, scanner}, gathered, result);
-  remark(gathered, config, result);
+  result.remarks = remarks_on(gathered, config, result);
   tell("segments", 7.0);
   result.segments = collect_segments(polled(unasked, progress), result.ground, result.trees,
                                      config.segments, kSegmentReach);

@@ -99,6 +99,7 @@ struct InventoryResult {
   std::string two_images;   // why its scans do not lie on each other; empty: nothing says so
   bool too_sparse = false;  // for stems: some are missing from the list
   bool from_above = false;  // too sparse, as hardly any of its points lie near breast height
+  bool open_land = false;   // the same, as hardly anything stands where the cloud is dense
   std::vector<std::string> remarks;
 };
 

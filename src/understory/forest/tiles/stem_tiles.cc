@@ -145,9 +145,9 @@ class StemTiles {
         if (!(height >= 0.0 && height <= kHighest)) continue;
         if (here) part.ceiling.count(place, height);
         if (here) part.low.add(height);
-        if (here && height < config_.highest_m) part.coverage.add(place);
+        const bool near_breast = height >= config_.lowest_m && height < config_.highest_m;
+        if (here && height < config_.highest_m) part.coverage.add(place, near_breast);
         if (!(height >= config_.lowest_m && height < highest_searched)) continue;
-        const bool near_breast = height < config_.highest_m;
         part.near_breast += here && near_breast ? 1 : 0;
         if (area.contains(thinner.corner_of(place.x(), place.y())))
           (near_breast ? thinner : above).add(place.x(), place.y(), height);

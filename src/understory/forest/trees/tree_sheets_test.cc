@@ -93,13 +93,28 @@ TEST(TreeSheets, AreTheSameForAnyOrderOfPoints) {
 TEST(ThinCoverage, CellsWithFewPointsAreThin) {
   CoverageGrid grid;
   for (int i = 0; i < 80; ++i)
-    grid.add({1.0, 1.0});
+    grid.add({1.0, 1.0}, false);
   for (int i = 0; i < 79; ++i)
-    grid.add({-1.0, 1.0});
+    grid.add({-1.0, 1.0}, true);
   const ThinCoverage thin = grid.thin();
   ASSERT_EQ(thin.corners.size(), 1U) << "80 points on 16 square metres are enough";
   EXPECT_EQ(thin.corners[0], Eigen::Vector2d(-4.0, 0.0));
   EXPECT_DOUBLE_EQ(thin.share, 0.5);
+  EXPECT_EQ(thin.dense_share, 0.0);
+  EXPECT_EQ(thin.near_breast_per_m2, 0.0);
+}
+
+TEST(ThinCoverage, DenseCellsTellWhatStandsOnThem) {
+  CoverageGrid grid;
+  for (int i = 0; i < 320; ++i)  // 20 a square metre
+    grid.add({1.0, 1.0}, i < 32);
+  CoverageGrid other;
+  for (int i = 0; i < 319; ++i)
+    other.add({-1.0, 1.0}, true);
+  grid.add(other);
+  const ThinCoverage thin = grid.thin();
+  EXPECT_DOUBLE_EQ(thin.dense_share, 0.5);
+  EXPECT_DOUBLE_EQ(thin.near_breast_per_m2, 2.0);
 }
 
 }  // namespace

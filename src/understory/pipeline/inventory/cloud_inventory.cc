@@ -155,7 +155,7 @@ void judge(const Stock& stock, const InventoryRequest& request, const Log& log,
   }
   if (!inventory.two_images.empty()) documents.lower(RunStatus::kUntrusted, inventory.two_images);
   const bool by_crowns = inventory.trees.size() > inventory.stems.size();
-  if (!inventory.too_sparse || (inventory.from_above && by_crowns)) return;
+  if (!inventory.too_sparse || inventory.open_land || (inventory.from_above && by_crowns)) return;
   const bool any = !inventory.trees.empty();
   if (any && of_run) return;
   std::string reason = few_points_reason(any);

@@ -50,14 +50,16 @@ void suit_matcher(const DenseMappingConfig& config, const ScanTraits& scans, con
     changes.set("registration." + setting.key, setting.value, why, when_s);
 }
 
-// A sparse scan is thinned less, its keyframes lie closer, and fewer of its points need a match.
+// A lidar with few rings, or open land, gives few points. Such a scan is thinned less, its
+// keyframes lie closer, and fewer of its points need a match.
 void suit_sparse_scans(const DenseMappingConfig& config, const SensorTraits& traits,
                        Changes& changes) {
   if (traits.scan_points == 0 ||
       traits.scan_points >= static_cast<std::uint64_t>(config.sparse_scan_points))
     return;
-  const std::string why =
-      fmt::format("sparse scans: {} points, fewer than run.sparse_scan_points", traits.scan_points);
+  const std::string rings = traits.rings > 0 ? fmt::format(" of {} rings", traits.rings) : "";
+  const std::string why = fmt::format("{} points a scan{}, fewer than run.sparse_scan_points ({})",
+                                      traits.scan_points, rings, config.sparse_scan_points);
   changes.at_most("preprocess.voxel.voxel_size_m", config.odometry.voxel.voxel_size_m,
                   config.sparse_voxel_m, why);
   changes.at_most("registration.min_inlier_ratio", config.odometry.match.min_inlier_ratio,

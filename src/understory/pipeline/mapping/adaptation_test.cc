@@ -192,7 +192,9 @@ TEST(Adaptation, PrintedWithWhatWasSetAndWhatWasChanged) {
   const std::string text =
       commented_yaml(adapt(read.config, read.origins, sixteen_rings(), {}), read.origins);
   EXPECT_NE(text.find("    voxel_size_m: 0.1 "), std::string::npos) << text;
-  EXPECT_NE(text.find(" # adapted from 0.4: sparse scans"), std::string::npos) << text;
+  EXPECT_NE(text.find(" # adapted from 0.4: 29000 points a scan of 16 rings, fewer than "),
+            std::string::npos)
+      << text;
   EXPECT_NE(text.find("  distance_m: 0.7 "), std::string::npos) << text;
   EXPECT_NE(text.find(" # set by --set. distance after which a scan"), std::string::npos) << text;
 }

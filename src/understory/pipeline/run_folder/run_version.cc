@@ -37,9 +37,9 @@ Version version_of(const std::string& text) {
 
 // A newer version may know more commands: its format tells that it is a run.
 bool is_a_run(const RunJson& json) {
-  return json.is_ours() || (json.find_number("/format") >= 1.0 &&
-                            !json.find_text("/command").empty() &&
-                            !json.find_text("/version").empty());
+  return json.is_ours() ||
+         (json.find_number("/format") >= 1.0 && !json.find_text("/command").empty() &&
+          !json.find_text("/version").empty());
 }
 
 void check_version(const fs::path& folder, const RunJson& json, Log& log) {
@@ -64,9 +64,9 @@ void refuse_unfinished(const fs::path& folder) {
                                  "when that has ended",
                                  *process > 0 ? fmt::format(" (process {})", *process) : ""));
   if (holds_unfinished_run(folder))
-    throw InputError(folder.string(), "",
-                     "holds a map that is not finished: `" + resume_command(folder) +
-                         "` finishes it");
+    throw InputError(
+        folder.string(), "",
+        "holds a map that is not finished: `" + resume_command(folder) + "` finishes it");
 }
 
 }  // namespace

@@ -55,7 +55,8 @@ TEST_F(RunVersionTest, ARunOfThisVersionOrAnOlderOneIsRead) {
   EXPECT_EQ(said(), "");
   write("0.0.9", kRunFormat);
   EXPECT_EQ(said(), "");
-  std::ofstream(folder_ / "run.json") << R"({"command": "map", "status": "partial", "version": "0"})";
+  std::ofstream(folder_ / "run.json")
+      << R"({"command": "map", "status": "partial", "version": "0"})";
   EXPECT_EQ(said(), "");  // of a version that named no format
 }
 
@@ -80,7 +81,8 @@ TEST_F(RunVersionTest, AFileOfARunIsCheckedAndAStrangerBesideItIsNot) {
 }
 
 TEST_F(RunVersionTest, AnotherProgramsRunJsonIsNoRun) {
-  std::ofstream(folder_ / "run.json") << R"({"command": "train.py", "status": "ok", "version": "9"})";
+  std::ofstream(folder_ / "run.json")
+      << R"({"command": "train.py", "status": "ok", "version": "9"})";
   EXPECT_EQ(said(), "");
 }
 

@@ -65,8 +65,9 @@ ConfigTable dense_mapping_table(DenseMappingConfig& config) {
   table.section("run", [&] {
     table.add("checkpoint_interval_s", config.loop.checkpoint_interval_s, {0.1, 5.0}, "s",
               "of recording between checkpoints");
-    table.add("sparse_scan_points", config.sparse_scan_points, {0, 100000000}, "points",
-              "with fewer points in a full scan, settings are adapted to a sparse lidar; 0: never");
+    table.add(
+        "sparse_scan_points", config.sparse_scan_points, {0, 100000000}, "points",
+        "with fewer points in a full scan, settings are adapted as to a sparse lidar; 0: never");
     table.add("sparse_voxel_m", config.sparse_voxel_m, {0.01, 10.0}, "m",
               "preprocess.voxel.voxel_size_m of a sparse lidar, unless that key is set");
     table.add("lost_after_scans", config.lost_after_scans, {1, 100000}, "scans",

@@ -251,7 +251,8 @@ void check_ranges(DenseFrontEnd& front_end, const ProgressSink& progress, MatchE
 RunEvidence evidence_of(const ReadRecording& recording, DenseFrontEnd& front_end,
                         const TrajectoryFacts& trajectory, const DenseProducts& made) {
   RunEvidence evidence;
-  evidence.stand = {made.inventory.trees.size(), made.inventory.too_sparse, made.not_upright,
+  evidence.stand = {made.inventory.trees.size(),
+                    made.inventory.too_sparse && !made.inventory.open_land, made.not_upright,
                     made.inventory.two_images};
   evidence.motion = trajectory.motion;
   evidence.match = trajectory.match;
