@@ -65,6 +65,14 @@ Vector3d kept_after(const ReceiverNoise& noise, double step_s) {
   return {slow, steady, std::exp(-step_s / noise.fast_correlation_s)};
 }
 
+// From each time to the next. Steps are far fewer than pairs of times.
+std::vector<Vector3d> kept_over_steps(const NoisyTimes& times, const ReceiverNoise& noise) {
+  std::vector<Vector3d> kept;
+  for (std::size_t k = 1; k < times.time_s.size(); ++k)
+    kept.push_back(kept_after(noise, times.time_s[k] - times.time_s[k - 1]));
+  return kept;
+}
+
 // `scale` to the power `follows`.
 VectorXd followed_scale(const NoisyTimes& times, double follows) {
   return (follows * times.scale.array().log()).exp();
@@ -227,8 +235,7 @@ struct Mode {
   Curvature covariance = Curvature::Identity();
 };
 
-// One unknown after the other, to the vertex of a parabola through three values. Steps become
-// shorter where they do not help.
+// One unknown after the other, to the vertex of a parabola. Steps shorten where they do not help.
 void search_along_axes(const Posterior& posterior, Mode& mode) {
   double step = 1.0;
   for (int round = 0; round < kSearchRounds && step > kShortestStep; ++round) {
@@ -424,22 +431,21 @@ MatrixXd noise_covariance(const NoisyTimes& times, const NoiseBelief& belief) {
     const VectorXd slow = noise.slow_sd_m * scale;
     const VectorXd fast = noise.fast_sd_m * scale;
     const double steady = noise.steady_sd_m * noise.steady_sd_m;
+    const std::vector<Vector3d> step = kept_over_steps(times, noise);
     for (Eigen::Index i = 0; i < n; ++i) {
       covariance(i, i) +=
           slow(i) * slow(i) + steady + (1.0 + kWhiteShare * kWhiteShare) * fast(i) * fast(i);
-      // Along a row the correlation is a product of steps.
-      Vector3d kept = Vector3d::Ones();
+      Vector3d kept = Vector3d::Ones();  // along a column a product of steps
       for (Eigen::Index j = i; j-- > 0;) {
-        const auto k = static_cast<std::size_t>(j);
-        kept = kept.cwiseProduct(kept_after(noise, times.time_s[k + 1] - times.time_s[k]));
+        kept = kept.cwiseProduct(step[static_cast<std::size_t>(j)]);
         if (kept.maxCoeff() < kLeastCorrelation) break;
-        covariance(i, j) +=
+        covariance(j, i) +=
             kept.x() * slow(i) * slow(j) + kept.y() * steady + kept.z() * fast(i) * fast(j);
       }
     }
   }
   covariance /= static_cast<double>(belief.noise.size());
-  covariance = covariance.selfadjointView<Eigen::Lower>();
+  covariance = covariance.selfadjointView<Eigen::Upper>();
   covariance.diagonal() += times.extra_sd_m.cwiseAbs2();
   return covariance;
 }
