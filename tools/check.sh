@@ -1,21 +1,11 @@
 #!/usr/bin/env bash
 # check.sh [BASE]: what a change has to pass beside the tests: layers, names, functions, docstrings,
-# comments and format. clang-tidy looks at the .cc files that differ from BASE (default: where this
-# branch left main; on main the last commit).
+# comments and format. clang-tidy looks at the .cc files that differ from BASE (see tidy.sh).
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 cd "$top"
 tools/setup.sh check
 failed=()
-
-default_base() {
-  local base
-  base=$(git merge-base HEAD origin/main 2>/dev/null || git merge-base HEAD main 2>/dev/null || true)
-  if [[ -z $base || $base == $(git rev-parse HEAD) ]]; then
-    base=$(git rev-parse -q --verify HEAD~1 || git hash-object -t tree /dev/null)
-  fi
-  echo "$base"
-}
 
 say "layers"
 python3 tools/check_layers.py || failed+=(layers)
@@ -35,7 +25,7 @@ python3 tools/check_comments_test.py || failed+=("the comments script's own test
 say "format"
 tools/format.sh --check || failed+=(format)
 say "clang-tidy on changed files"
-tools/tidy.sh "${1:-$(default_base)}" || failed+=(clang-tidy)
+tools/tidy.sh ${1:+"$1"} || failed+=(clang-tidy)
 
 if ((${#failed[@]})); then
   printf -v list '%s, ' "${failed[@]}"

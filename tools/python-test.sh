@@ -13,11 +13,11 @@ if [[ -n ${UNDERSTORY_PACKAGES:-} ]]; then
   if [[ -x $own ]]; then python=$own; fi
 fi
 if [[ ! -x $python ]]; then python=$(command -v python3) || { echo "no python3"; exit 77; }; fi
-for module in ${modules//,/ }; do
-  if ! "$python" -c "import $module" 2>/dev/null; then
-    echo "skipped: the Python package $module is not installed (tools/python-env.sh)"
-    exit 77
-  fi
-done
+if [[ -n $modules ]] && ! "$python" -c "import ${modules//,/, }" 2>/dev/null; then
+  for module in ${modules//,/ }; do
+    "$python" -c "import $module" 2>/dev/null || echo "skipped: the Python package $module is not installed (tools/python-env.sh)"
+  done
+  exit 77
+fi
 export UNDERSTORY_DATA=${UNDERSTORY_DATA:-$top/../shared/data} PYTHONDONTWRITEBYTECODE=1
 exec "$python" "$@"

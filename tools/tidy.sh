@@ -1,11 +1,20 @@
 #!/usr/bin/env bash
-# tidy.sh BASE|all: clang-tidy on the .cc files (tests apart) that differ from the commit BASE, or on
-# every one.
+# tidy.sh [BASE|all]: clang-tidy on the .cc files (tests apart) that differ from the commit BASE, or on
+# every one. The default is where this branch left main; on main the last commit.
 # A file that passed before is passed over: the cache holds the hash of each that did, taken over
 # its preprocessed text and the configuration.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 cd "$top"
+
+default_base() {
+  local base
+  base=$(git merge-base HEAD origin/main 2>/dev/null || git merge-base HEAD main 2>/dev/null || true)
+  if [[ -z $base || $base == $(git rev-parse HEAD) ]]; then
+    base=$(git rev-parse -q --verify HEAD~1 || git hash-object -t tree /dev/null)
+  fi
+  echo "$base"
+}
 
 tidy_file() { # one .cc file
   local file=$1 command hash
@@ -35,7 +44,7 @@ fi
 if [[ ${1:-} == all ]]; then
   mapfile -t files < <(git ls-files -- 'src/*.cc' ':!*_test.cc')
 else
-  mapfile -t files < <(git diff --name-only --diff-filter=d "${1:?which commit to compare with}" -- 'src/*.cc' ':!*_test.cc')
+  mapfile -t files < <(git diff --name-only --diff-filter=d "${1:-$(default_base)}" -- 'src/*.cc' ':!*_test.cc')
 fi
 if ((${#files[@]} == 0)); then
   say "no changed files"
