@@ -97,7 +97,7 @@ def moved(folder):
 
 @cases.case("without an IMU nothing is mapped, and the message says why")
 def no_imu(folder):
-    silent = program("map", "sim:harvester?seed=5&duration_s=14&imu.enabled=false", "-o", folder / "none", "--imu-rate")
+    silent = program("map", "sim:harvester?seed=5&duration_s=2&imu.enabled=false", "-o", folder / "none", "--imu-rate")
     assert silent.returncode == 3 and "expected an IMU" in silent.stderr, silent.stderr
     for more in (["--front-end", "sparse"], ["--set", "motion.imu_enabled=false"]):
         refused = program("map", SHORT, "-o", folder / "none", "--imu-rate", *more)

@@ -10,8 +10,10 @@ import sys
 import tempfile
 from pathlib import Path
 
+from program import simulated
+
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
-SITE = "sim:lake?seed=3&duration_s=26&blindness.interval_s=36&blindness.length_s=3"  # blind from 18 to 21 s
+BLIND = ("blindness.interval_s=36", "blindness.length_s=3")  # from 18 to 21 s
 
 
 def ups(path):
@@ -30,16 +32,18 @@ def tilts_deg(run, truth):
 
 def main():
     run = Path(tempfile.mkdtemp()) / "run"
-    mapped = subprocess.run([PROGRAM, "--quiet", "map", SITE, "-o", run, "--threads", "2", "--set",
+    ride = simulated("lake", 3, 26, *BLIND)
+    truth = ride.with_suffix(".truth")
+    mapped = subprocess.run([PROGRAM, "--quiet", "map", ride, "-o", run, "--threads", "2", "--set",
                              "map.enabled=false"], capture_output=True, text=True)
     report = json.loads((run / "run.json").read_text())
-    errors = json.loads(subprocess.run([PROGRAM, "evaluate", run, f"{run}.truth", "--align", "se3", "--json"],
+    errors = json.loads(subprocess.run([PROGRAM, "evaluate", run, truth, "--align", "se3", "--json"],
                                        capture_output=True, text=True, check=True).stdout)
     keys = [warning["key"] for warning in report["warnings"]]
     print(mapped.returncode, report["status"], f"{errors['ape_rmse_m']:.3f} m", keys)
     if errors["ape_rmse_m"] > 0.6:
         sys.exit("blind_lidar: the new piece is not where the IMU knows it to be")
-    tilts = tilts_deg(run, Path(f"{run}.truth"))
+    tilts = tilts_deg(run, truth)
     print(f"tilt of the first piece {max(tilts[:150]):.2f}, of the last second {max(tilts[-10:]):.2f} degrees")
     if max(tilts[:150]) > 1.0 or max(tilts[-10:]) > 1.0:
         sys.exit("blind_lidar: levelling the new piece tilted the old one, or did not level the new one")

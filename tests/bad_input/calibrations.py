@@ -39,10 +39,8 @@ def minutes(folder):
 
 @cases.case("motion and short recordings are refused, and nothing is written")
 def refusals(folder):
-    walk = folder / "walk.mcap"
-    words = [word for setting in ("lidar.model=VLP-16", "carrier.still_s=6", "stand.size_x_m=30", "stand.size_y_m=30",
-                                  "gnss.enabled=false") for word in ("--set", setting)]
-    assert program("simulate", "demo", "-o", walk, "--duration-s", "12", *words).returncode == 0
+    walk = simulated("demo", 1, 12, "lidar.model=VLP-16", "carrier.still_s=6", "stand.size_x_m=30", "stand.size_y_m=30",
+                     "gnss.enabled=false")
     before = snapshot(folder)
     for more, said in (((), "it stood from 0.0 s to 6"), (("--to-s", "5"), "at least 60 s of standing"),
                        (("--from-s", "100"), "expected samples of an IMU")):
@@ -124,7 +122,7 @@ def clipped_imu(folder):
 
 @cases.case("a machine that drives calmly for seconds tells its IMU only roughly")
 def calm_lidar_imu(folder):
-    drive = "sim:harvester?seed=5&duration_s=12.5&lidar.model=VLP-16&gnss.enabled=false&stand.size_x_m=80&stand.size_y_m=60"
+    drive = simulated("harvester", 5, 12.5, "lidar.model=VLP-16", "gnss.enabled=false", "stand.size_x_m=80", "stand.size_y_m=60")
     done = program("calibrate", "lidar-imu", drive, "-o", folder / "rig")
     assert done.returncode == 4 and "Record a minute" in done.stderr, done
     assert "only roughly known are" in done.stderr, done

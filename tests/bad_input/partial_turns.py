@@ -6,7 +6,7 @@ half a second."""
 import dataclasses
 import struct
 
-from program import Cases, error_m, map_recording, program
+from program import Cases, error_m, map_recording, simulated, unpacked
 from recordings import Cloud, NS, read_mcap, write_capture, write_mcap
 
 TURN_NS = 100_000_000
@@ -16,19 +16,13 @@ PACKET_NS = 24 * 55_296
 cases = Cases()
 
 
-def simulated(name, *settings):
+def scans_of(*settings):
     """Two seconds on foot with a VLP-16 and no IMU: its scans, and the truth."""
-    first, path = cases.folder / f"{name}.first.mcap", cases.folder / f"{name}.mcap"
-    words = ("duration_s=2", "seed=5", "lidar.model=VLP-16", "gnss.enabled=false", *settings)
-    for arguments in (("simulate", "demo", "-o", first, *(w for s in words for w in ("--set", s))),
-                      ("convert", first, path, "--compression", "none")):
-        done = program(*arguments)
-        assert done.returncode == 0, done.stderr
-    return [m for m in read_mcap(path) if m.topic == "/lidar"], cases.folder / f"{name}.first.truth"
+    walk = simulated("demo", 5, 2, "lidar.model=VLP-16", "gnss.enabled=false", *settings)
+    return [m for m in read_mcap(unpacked(walk)) if m.topic == "/lidar"], walk.with_suffix(".truth")
 
 
-walks = {"stands": simulated("stands", "carrier.still_s=60"),
-         "moves": simulated("moves", "carrier.still_s=0")}
+walks = {"stands": scans_of("carrier.still_s=60"), "moves": scans_of("carrier.still_s=0")}
 
 
 def expect_found(outcome, truth, left_out):

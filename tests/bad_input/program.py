@@ -21,6 +21,9 @@ SITE = ("lidar.model=VLP-16", "carrier.still_s=1",
 # Fixes that are good everywhere, and a stand of few trees, for tests of something else than trees.
 GOOD_SKY = ("gnss.canopy_sd_m=0.02", "gnss.open_sd_m=0.02", "gnss.white_sd_m=0.02", "gnss.jump_interval_s=0",
             "gnss.burst_interval_s=0")
+# Each second scan, for tests of positions by satellites: half the work, and the path is as good.
+HALF_THE_SCANS = ("lidar.keep_every=2",)
+SCANS_PER_S = 5
 SMALL_STAND = ("stand.size_x_m=40", "stand.size_y_m=40", "stand.trees_per_ha=400")
 
 
@@ -117,15 +120,15 @@ def made_once(words, make, made_by=None, shared=BUILD / "tests" / "recordings"):
     return shared / name
 
 
-def simulated(site, seed, seconds, *settings):
+def simulated(site, seed, seconds, *settings, name="walk.mcap"):
     """A recording that `simulate` wrote with those settings, its truth beside it in walk.truth. It lies in the cache, for
-    all tests of all builds whose simulator is the same."""
+    all tests of all builds whose simulator is the same. 0 seconds: as long as the route takes."""
     def make(folder):
-        done = program("simulate", site, "-o", folder / "walk.mcap", "--seed", seed, "--duration-s", seconds,
+        done = program("simulate", site, "-o", folder / name, "--seed", seed, "--duration-s", seconds,
                        *(word for setting in settings for word in ("--set", setting)))
         assert done.returncode == 0, done.stderr
-    words = ("simulate", site, seed, seconds, *settings)
-    return made_once(words, make, simulator(), CACHE / "recordings") / "walk.mcap"
+    words = ("simulate", site, seed, seconds, *settings, *(() if name == "walk.mcap" else (name,)))
+    return made_once(words, make, simulator(), CACHE / "recordings") / name
 
 
 def unpacked(recording):
@@ -149,6 +152,18 @@ def two_runs(recording):
             for line in (run / "trajectory.tum").read_text().splitlines()[::10]))
     made = made_once(("two runs", str(recording)), make)
     return made / "run", made / "stems", made / "fixes.csv"
+
+
+def reported_walk():
+    """A walk with a lidar of 128 rings, mapped straight from the simulator, and the run's full inventory: (run, inventory).
+    Shared, to be read."""
+    def make(folder):
+        for words in (("map", "sim:demo?duration_s=8&seed=4", "-o", folder / "run"),
+                      ("inventory", folder / "run", "-o", folder / "inventory")):
+            done = program(*words)
+            assert done.returncode == 0, done.stderr
+    made = made_once(("reported walk",), make)
+    return made / "run", made / "inventory"
 
 
 def unfinished_run(folder, checkpoint=b"half"):

@@ -4,12 +4,14 @@ processed again, and the results have the bytes of an undisturbed run. `./run ac
 
 import os
 import pathlib
-import subprocess
 import sys
 import tempfile
 
 from cuts import Run
 from disk import MAKE, RENAME, SYNC
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "bad_input"))
+from program import simulated
 
 INTERVAL_S = 2.0
 SLACK_S = 1.0  # a checkpoint comes with the scan after its time, or the next one that closes a gap
@@ -18,8 +20,8 @@ library = pathlib.Path(os.environ["UNDERSTORY_BUILD"]) / "tests" / "libpower_cut
 if not library.exists():
     print("skipped: the library is built on Linux on x86-64 only, without sanitizers")
     sys.exit(77)
-SITES = {"dense": ["demo", "lidar.model=VLP-16", "carrier.still_s=1", "carrier.turn_interval_s=4", "duration_s=9"],
-         "sparse": ["harvester", "lidar.model=VLP-16", "duration_s=14"]}
+SITES = {"dense": ("demo", 5, 9, "lidar.model=VLP-16", "carrier.still_s=1", "carrier.turn_interval_s=4"),
+         "sparse": ("harvester", 5, 14, "lidar.model=VLP-16")}
 
 
 def moments(run):
@@ -47,11 +49,7 @@ def moments(run):
 
 with tempfile.TemporaryDirectory() as scratch:
     scratch = pathlib.Path(scratch).resolve()
-    site, *settings = SITES[front_end]
-    made = subprocess.run([program, "--quiet", "simulate", site, "-o", scratch / "r.mcap", "--set", "seed=5",
-                           *(word for setting in settings for word in ("--set", setting))])
-    assert made.returncode == 0
-    run = Run(program, library, scratch / "r.mcap", scratch, front_end, INTERVAL_S)
+    run = Run(program, library, simulated(*SITES[front_end]), scratch, front_end, INTERVAL_S)
     print(f"{len(run.calls)} calls, {len(run.results)} results")
     failed = []
     for what, number, seed, mode, spoil, most in moments(run):

@@ -9,6 +9,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
+from program import simulated
+
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 AS_SEEN = ["registration.ndt.near_side_line=0", "registration.ndt.near_side_volume=0"]
 WITH_FLAKES = ["preprocess.isolated.within_m=0"]
@@ -30,9 +33,7 @@ def scale_percent(recording, folder, settings=()):
 def main():
     with tempfile.TemporaryDirectory() as scratch:
         work = Path(scratch)
-        recording = work / "sleigh.mcap"
-        run("simulate", "skidoo", "-o", recording, "--seed", 7, "--duration-s", 30, "--set",
-            "lidar.snow_fall_per_m=0.01")
+        recording = simulated("skidoo", 7, 30, "lidar.snow_fall_per_m=0.01")
         shipped = scale_percent(recording, work / "shipped")
         near_side = scale_percent(recording, work / "near_side", AS_SEEN)
         flakes = scale_percent(recording, work / "flakes", WITH_FLAKES)

@@ -8,6 +8,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
+from program import simulated
+
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 
 
@@ -20,8 +23,9 @@ def run(*words):
 def main():
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "run"
-        run("map", "sim:lieksa2?seed=7&duration_s=60", "-o", folder)
-        truth = Path(f"{folder}.truth")
+        ride = simulated("lieksa2", 7, 60)
+        run("map", ride, "-o", folder)
+        truth = ride.with_suffix(".truth")
         seen = json.loads(run("evaluate", "trees", folder, truth, "--matching", "nearest", "--align", "yaw", "--truth-returns", truth,
                               "--path", truth, "--within-m", 15, "--min-returns", 30, "--json"))["visible"]
     said = f"{100 * seen['recall']:.0f} % of {seen['expected']} trees, {100 * seen['false_share']:.0f} % false"

@@ -67,7 +67,8 @@ def written(path, points):
 @cases.case("the entropy of a piece of the cloud is that of the definition, for any radius, and grows where it blurs")
 def definition(folder):
     run = folder / "run"
-    done = program("map", "sim:demo?seed=7&duration_s=8&lidar.model=VLP-16&stand.size_x_m=40&stand.size_y_m=40", "-o", run)
+    walk = simulated("demo", 7, 8, "lidar.model=VLP-16", "stand.size_x_m=40", "stand.size_y_m=40")
+    done = program("map", walk, "-o", run)
     assert done.returncode in (0, 4), done.stderr
     cloud = laspy.read(run / "map.laz")
     points = numpy.column_stack((cloud.x, cloud.y, cloud.z))

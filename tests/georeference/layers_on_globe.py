@@ -17,7 +17,7 @@ import laspy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, placed_recording, program
+from program import Cases, placed_recording, program, simulated
 
 cases = Cases()
 A, F = 6378137.0, 1 / 298.257223563
@@ -210,7 +210,7 @@ def local(folder):
 
 @cases.case("a map that cannot be placed says why, and is as good as before")
 def short(folder):
-    done = program("map", f"sim:demo?seed=4&duration_s=5&lidar.model=VLP-16", "-o", folder / "run")
+    done = program("map", simulated("demo", 4, 5, "lidar.model=VLP-16"), "-o", folder / "run")
     facts = facts_of(folder / "run")
     assert not facts["georeference"]["on_globe"] and facts["georeference"]["reason"], facts["georeference"]
     assert "gnss.not_placed" in {w["key"] for w in facts["warnings"]} and "no place on the globe" in done.stderr

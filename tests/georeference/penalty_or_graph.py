@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program, simulated
+from program import HALF_THE_SCANS, SCANS_PER_S, Cases, program, simulated
 
 cases = Cases()
 WAYS = {"none": (), "penalty": ("gnss.match.use=penalty",), "graph": ("gnss.use=fuse",),
@@ -15,8 +15,8 @@ WAYS = {"none": (), "penalty": ("gnss.match.use=penalty",), "graph": ("gnss.use=
 SECONDS = 30
 # RTK all the way, and the receiver of the site: it errs by decimetres for a minute.
 RTK = simulated("skidoo", 5, SECONDS, "gnss.canopy_sd_m=0.03", "gnss.jump_interval_s=0")
-UNDER_TREES = simulated("skidoo", 5, SECONDS)
-TWO_ANTENNAS = simulated("skidoo", 5, SECONDS, "gnss.second_antenna_m=[0.9,0,0]", "gnss.heading_sd_deg=0.2")
+UNDER_TREES = simulated("skidoo", 5, SECONDS, *HALF_THE_SCANS)
+TWO_ANTENNAS = simulated("skidoo", 5, SECONDS, *HALF_THE_SCANS, "gnss.second_antenna_m=[0.9,0,0]", "gnss.heading_sd_deg=0.2")
 
 
 def mapped(recording, folder, *settings):
@@ -78,7 +78,7 @@ def second_antenna(folder):
     begins = {name: one["quality"]["gnss_match_from_s"] for name, one in told.items()}
     assert begins["two"] <= begins["one"], begins
     # Under trees most fixes say no place. The heading counts at each scan.
-    share = {name: one["counts"]["scans_by_satellites"] / (one["scans"] - 10 * begins[name]) for name, one in told.items()}
+    share = {name: one["counts"]["scans_by_satellites"] / (one["scans"] - SCANS_PER_S * begins[name]) for name, one in told.items()}
     assert share["two"] > 0.95 > 0.8 > share["one"], share
     assert errors(TWO_ANTENNAS, folder / "two")["ape_rotation_rmse_deg"] < 0.5
     return f"{100 * share['two']:.0f} % of the scans, without {100 * share['one']:.0f} %"

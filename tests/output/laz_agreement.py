@@ -9,11 +9,15 @@ import json
 import os
 import sqlite3
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
 import laspy
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
+from program import simulated
 
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 SHIFT = np.array([385_000.0, 6_672_000.0, 40.0])  # into the plane of ETRS89 / TM35FIN
@@ -159,9 +163,7 @@ def check_points_by_laspy(folder):
 
 with tempfile.TemporaryDirectory() as scratch:
     scratch = Path(scratch)
-    recording = scratch / "walk.mcap"
-    run("simulate", "demo", "-o", recording, "--set", "duration_s=8", "--set", "seed=4", "--set", "gnss.enabled=false", "--set", "lidar.columns=512",
-        "--set", "stand.size_x_m=40", "--set", "stand.size_y_m=40")
+    recording = simulated("demo", 4, 8, "gnss.enabled=false", "lidar.columns=512", "stand.size_x_m=40", "stand.size_y_m=40")
     run("map", recording, "-o", scratch / "run")
     las, facts = check_map(scratch / "run")
     print("map.laz:", facts["counts"]["map_points"], "points read by laspy")

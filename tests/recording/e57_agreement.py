@@ -6,6 +6,7 @@ trees are nearly the same."""
 import csv
 import os
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -13,6 +14,9 @@ import laspy
 import numpy as np
 import pye57
 from pye57 import libe57
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
+from program import simulated
 
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 TURN = np.radians(35.0)
@@ -103,7 +107,8 @@ def add_scaled_scan(file, points):
 
 with tempfile.TemporaryDirectory() as scratch:
     room = Path(scratch)
-    run("map", "sim:demo?seed=3&duration_s=8&lidar.columns=512&stand.size_x_m=40&stand.size_y_m=40&stand.trees_per_ha=400", "-o", room / "run")
+    walk = simulated("demo", 3, 8, "lidar.columns=512", "stand.size_x_m=40", "stand.size_y_m=40", "stand.trees_per_ha=400")
+    run("map", walk, "-o", room / "run")
     points = laspy.read(room / "run" / "map.laz").xyz
     points = points - np.round(np.median(points, axis=0))  # they are in a coordinate system
     points = points[np.abs(points).max(axis=1) < 50.0]

@@ -4,7 +4,11 @@ import json
 import os
 import pathlib
 import subprocess
+import sys
 import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "bad_input"))
+from program import simulated
 
 PROGRAM = os.environ["UNDERSTORY_PROGRAM"]
 SECONDS = 12
@@ -17,10 +21,8 @@ def program(*arguments):
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        walk = folder / "walk.mcap"
-        done = program("simulate", "mid360", "-o", walk, "--seed", 3, "--duration-s", SECONDS, "--set", "stand.size_x_m=80",
-                       "--set", "stand.size_y_m=80", "--set", "carrier.length_m=60", "--set", "gnss.enabled=false")
-        assert done.returncode == 0, done.stderr
+        walk = simulated("mid360", 3, SECONDS, "stand.size_x_m=80", "stand.size_y_m=80", "carrier.length_m=60",
+                         "gnss.enabled=false")
         done = program("map", walk, "-o", folder / "run", "--front-end", "sparse")
         assert done.returncode in (0, 4), done.stderr
         poses = (folder / "run" / "trajectory.tum").read_text().splitlines()

@@ -2,9 +2,8 @@
 and an MCAP. Every point is read here with its own time, line and reflectivity. What the simulator writes
 of a Mid-360 is read by rosbags."""
 
-import os
 import pathlib
-import subprocess
+import sys
 import tempfile
 
 import numpy as np
@@ -15,6 +14,9 @@ from rosbags.rosbag2 import Writer as Bag2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from scans import check, read_scans
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "bad_input"))
+from program import simulated
 
 POINT_TEXT = """uint32 offset_time
 float32 x
@@ -88,10 +90,8 @@ def compare(path):
         check((times == begin + theirs["offset_time"]).all(), f"{path}: times differ")
 
 
-def read_simulated(folder):
-    recording = folder / "walk.mcap"
-    subprocess.run([os.environ["UNDERSTORY_PROGRAM"], "--quiet", "simulate", "mid360", "--seed", "3",
-                    "--duration-s", "0.6", "-o", recording], check=True)
+def read_simulated():
+    recording = simulated("mid360", 3, 0.6)
     ours = list(read_scans(recording))
     with AnyReader([recording], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         topic = [c for c in reader.connections if c.topic == "/livox/lidar"]
@@ -116,4 +116,4 @@ with tempfile.TemporaryDirectory() as name:
             path = folder / (f"{package}.bag" if kind == "bag" else f"{package}_{kind}")
             write(path, package, kind)
             compare(path)
-    print("6 recordings of rosbags,", read_simulated(folder), "simulated scans: equal")
+    print("6 recordings of rosbags,", read_simulated(), "simulated scans: equal")

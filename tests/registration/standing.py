@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program
+from program import Cases, program, simulated
 
 import laspy
 import numpy
@@ -82,20 +82,19 @@ def far_from_all(places, true_places, reach):
 
 @cases.case("the map has no more points off its surfaces from long standing than from the way")
 def no_rings(folder):
-    settings = [word for setting in SITE for word in ("--set", setting)]
-    done = program("simulate", "skidoo", "-o", folder / "a.mcap", "--seed", 4, *settings)
-    assert done.returncode == 0, done.stderr
+    ride = simulated("skidoo", 4, 0, *SITE)  # 0: as long as the route takes
+    true_folder = ride.with_suffix(".truth")
     # All that the scans saw, not only the first point of each cube.
-    done = program("map", folder / "a.mcap", "-o", folder / "run", "--profile", "sleigh", "--set", "map.thin_m=0")
+    done = program("map", ride, "-o", folder / "run", "--profile", "sleigh", "--set", "map.thin_m=0")
     assert done.returncode in (0, 4), done.stderr
-    mine, truth = poses(folder / "run" / "trajectory.tum"), poses(folder / "a.truth" / "trajectory.tum")
+    mine, truth = poses(folder / "run" / "trajectory.tum"), poses(true_folder / "trajectory.tum")
     both, i, j = numpy.intersect1d(mine[:, 0].round(3), truth[:, 0].round(3), return_indices=True)
     assert len(both) > 100, len(both)
-    with open(folder / "a.truth" / "velocity.csv", newline="") as file:
+    with open(true_folder / "velocity.csv", newline="") as file:
         speeds = numpy.array([[float(cell) for cell in row] for row in list(csv.reader(file))[1:]])
     still = speeds[numpy.linalg.norm(speeds[:, 1:4], axis=1) < STILL_M_S, 0]
     places, times, bright = read(folder / "run" / "map.laz")
-    true_places, true_times, true_bright = read(folder / "a.truth" / "points.laz")
+    true_places, true_times, true_bright = read(true_folder / "points.laz")
     # Points of one time and brightness lay the map on the truth.
     _, a, b = numpy.intersect1d(times.round(7), true_times.round(7), return_indices=True)
     same = bright[a] == true_bright[b]

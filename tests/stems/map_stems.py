@@ -215,12 +215,10 @@ def threads(folder):
 
 @cases.case("a scanner's capture")
 def capture(folder):
-    rec = folder / "field.pcap"
-    done = program("simulate", "lieksa2", "-o", rec, "--seed", 5, "--set", "duration_s=40")
+    rec = simulated("lieksa2", 5, 40, name="field.pcap")
+    done = sparse(rec, folder / "run", "--extrinsics", rec.with_suffix(".extrinsics.yaml"))
     assert done.returncode == 0, done.stderr
-    done = sparse(rec, folder / "run", "--extrinsics", folder / "field.extrinsics.yaml")
-    assert done.returncode == 0, done.stderr
-    errors = evaluated(folder / "run", folder / "field.truth", "--align", "first")
+    errors = evaluated(folder / "run", rec.with_suffix(".truth"), "--align", "first")
     assert errors["pairs"] > 150 and errors["ape_plane_rmse_m"] < 0.1, errors
     # The scanner's own NMEA sentences tell no height: the places of the fixes do not suffer.
     told = json.loads((folder / "run" / "run.json").read_text())

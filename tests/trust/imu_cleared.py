@@ -8,35 +8,26 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import PROGRAM, Cases, program
+from program import PROGRAM, Cases, simulated
 
 cases = Cases()
 
 # A slow turn over even ground. Matched to small cells alone and with the machine's own returns, as here, it looks as if
 # the machine stood still.
-TURN = {"carrier.still_s": "6.05", "carrier.first_turn_deg": "-120.0", "carrier.first_turn_rate_deg_s": "35.0",
-        "lidar.mount_rpy_deg": "[0,26.8,0]"}
+TURN = simulated("swing", 10, 12, "carrier.still_s=6.05", "carrier.first_turn_deg=-120.0",
+                 "carrier.first_turn_rate_deg_s=35.0", "lidar.mount_rpy_deg=[0,26.8,0]")
 MISLED = ("registration.ndt.sparse_cell_m=0", "preprocess.carried.reach_m=0")
 
 
-def turned(folder):
-    recording = folder / "turn.mcap"
-    done = program("simulate", "swing", "-o", recording, "--seed", 10, "--duration-s", 12,
-                   *(word for key, value in TURN.items() for word in ("--set", f"{key}={value}")))
-    assert done.returncode == 0, done.stderr
-    return recording
-
-
-def mapped(recording, folder, *settings):
+def mapped(folder, *settings):
     words = [word for setting in ("map.enabled=false", *settings) for word in ("--set", setting)]
-    done = subprocess.run([PROGRAM, "map", recording, "-o", folder, *words], capture_output=True, text=True, timeout=300)
+    done = subprocess.run([PROGRAM, "map", TURN, "-o", folder, *words], capture_output=True, text=True, timeout=300)
     return done, json.loads((folder / "run.json").read_text())
 
 
 @cases.case("the recording is mapped again with an IMU that was doubted and is right")
 def cleared(folder):
-    recording = turned(folder)
-    done, facts = mapped(recording, folder / "run", *MISLED)
+    done, facts = mapped(folder / "run", *MISLED)
     said = done.stderr
     doubted = said.index("started again without the IMU")
     assert said.index("the IMU is right: the recording is mapped again from its beginning") > doubted, said
@@ -51,7 +42,7 @@ def cleared(folder):
 
 @cases.case("with larger cells in sparse places, and without the machine, the turn is followed")
 def followed(folder):
-    done, facts = mapped(turned(folder), folder / "run")
+    done, facts = mapped(folder / "run")
     assert done.returncode == 0 and facts["status"] == "complete", done.stderr
     assert not any(w["key"].startswith("imu.") for w in facts["warnings"]), facts["warnings"]
     return f"{facts['scans']} scans"
