@@ -9,19 +9,28 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program
-from strip_roads import Roads, write_strip_roads
+import strip_roads
+from program import CACHE, Cases, digest, made_once, program
 
 # Everything but these is the same bytes for any number of threads: they hold times and memory.
 TIMED = {"run.json", "report.html"}
 
+
+def driven(seed, second_look=False, **roads):
+    """Strip roads as strip_roads.py writes them: the folder, and how many views it holds. It lies in the cache, for all
+    tests that ask for the same."""
+    def make(folder):
+        strip_roads.write_strip_roads(folder, seed, strip_roads.Roads(**roads), second_look)
+    made_by = digest((strip_roads.__file__,), sys.version)
+    folder = made_once((seed, second_look, *roads.items()), make, made_by, CACHE / "strip_roads")
+    return folder, len((folder / "truth" / "trajectory.tum").read_text().splitlines())
+
+
 cases = Cases()
-SITE = cases.folder / "site"
-VIEWS = write_strip_roads(SITE, seed=3)
+SITE, VIEWS = driven(3)
 STEMS = SITE / "stems.csv.gz"
 # One road of 60 m, where it does not matter what the map is like.
-SMALL = cases.folder / "small"
-SMALL_VIEWS = write_strip_roads(SMALL, seed=7, roads=Roads(roads=1, length_m=60.0))
+SMALL, SMALL_VIEWS = driven(7, roads=1, length_m=60.0)
 LINES = gzip.decompress(STEMS.read_bytes()).decode().splitlines()
 
 
@@ -90,12 +99,12 @@ def methods(folder):
     A method ends where its own map is sharpest. So the map is judged by stems that no method has
     seen: a second look at the same trees, placed by the corrected poses.
     """
-    views = write_strip_roads(folder, seed=5, roads=Roads(length_m=120.0), second_look=True)
+    site, views = driven(5, second_look=True, length_m=120.0)
     said, noise = [], {}
     for method in ("none", "powers", "powers_printed", "lattice", "pose_graph",
                    "gaussian_process", "expected_gain"):
         run = folder / method
-        done = correct(folder / "stems.csv.gz", run, "--set", f"correction.method={method}",
+        done = correct(site / "stems.csv.gz", run, "--set", f"correction.method={method}",
                        "--set", "odometry.target=frame")
         assert done.returncode in (0, 4), done.stderr
         told = json.loads((run / "run.json").read_text())
@@ -103,9 +112,9 @@ def methods(folder):
         rows = table(run / "corrections.csv")
         kept = sum(int(row["kept"]) for row in rows)
         assert kept == told["counts"]["corrections"] and len(rows) >= kept
-        sharpness = evaluated("map", folder / "second_look.csv.gz", run)
+        sharpness = evaluated("map", site / "second_look.csv.gz", run)
         noise[method] = sharpness["registration_noise_mean_m"]
-        errors = evaluated(run, folder / "truth", "--align", "se3")
+        errors = evaluated(run, site / "truth", "--align", "se3")
         said.append((method, errors["ape_plane_rmse_m"]))
     errors = dict(said)
     assert errors["expected_gain"] < 0.5 * errors["none"], errors
@@ -132,11 +141,11 @@ def threads(folder):
 @cases.case("odometry from view to view by branch and bound in a small box")
 def go_icp(folder):
     """P1's sSLAM beside P0's ICP; each step says how well it fits."""
-    views = write_strip_roads(folder, seed=8, roads=Roads(roads=1, length_m=60.0))
+    site, views = driven(8, roads=1, length_m=60.0)
     plane, searched = [], []
     for matcher in ("icp", "go_icp"):
         run = folder / matcher
-        done = correct(folder / "stems.csv.gz", run, "--set", f"odometry.matcher={matcher}", "--set",
+        done = correct(site / "stems.csv.gz", run, "--set", f"odometry.matcher={matcher}", "--set",
                        "odometry.target=frame", "--set", "correction.method=none", "--set", "close_loops=false")
         assert done.returncode in (0, 4), done.stderr
         head, *rows = (line.split(",") for line in (run / "steps.csv").read_text().splitlines())
@@ -149,7 +158,7 @@ def go_icp(folder):
         mean = sum(float(row["error_m"]) for row in rows[1:]) / (views - 1)
         assert abs(quality["match_error_mean_m"] - mean) < 1e-4, (quality["match_error_mean_m"], mean)
         searched.append(sum(row["status"] == "searched" for row in rows))
-        plane.append(evaluated(run, folder / "truth", "--align", "se3")["ape_plane_rmse_m"])
+        plane.append(evaluated(run, site / "truth", "--align", "se3")["ape_plane_rmse_m"])
     assert plane[1] < plane[0] + 0.05 and searched[1] < searched[0], (plane, searched)
     return (f"ICP {100 * plane[0]:.1f} cm and {searched[0]} searches, Go-ICP {100 * plane[1]:.1f} cm "
             f"and {searched[1]}, of {views} views")
@@ -186,8 +195,8 @@ def eliminated(folder):
 @cases.case("a run is corrected from its own trajectory on")
 def run_again(folder):
     """The start is what the run says, here the truth with a bend; every pose of it is corrected."""
-    site, run = folder / "site", folder / "run"
-    views = write_strip_roads(site, seed=6, roads=Roads(roads=1, length_m=60.0))
+    run = folder / "run"
+    site, views = driven(6, roads=1, length_m=60.0)
     run.mkdir()
     (run / "stems.csv.gz").write_bytes((site / "stems.csv.gz").read_bytes())
     (run / "run.json").write_text('{"command": "map", "version": "0.1.0", "status": "complete", "reasons": []}')
@@ -330,8 +339,7 @@ def unfinished(folder):
 @cases.case("stems without axes, times and diameters")
 def bare(folder):
     """Only frame, x, y, z are needed: without axes the z axis of the sensor is taken as up."""
-    site = folder / "site"
-    write_strip_roads(site, seed=4, roads=Roads(roads=1, tilt_deg=0.2))
+    site, _ = driven(4, roads=1, tilt_deg=0.2)
     rows = [line.split(",") for line in
             gzip.decompress((site / "stems.csv.gz").read_bytes()).decode().splitlines()]
     path = folder / "stems.csv"
