@@ -7,13 +7,13 @@ import math
 import struct
 from random import Random
 
-from program import GOOD_SKY, SMALL_STAND, Cases, program, rewritten, simulated
+from program import GOOD_SKY, HALF_THE_SCANS, SMALL_STAND, Cases, program, rewritten, simulated
 from recordings import edit_fix
 
 cases = Cases()
 SECONDS = 45
 DRIFT_FROM_S, DRIFT_UNTIL_S = 25.0, 35.0
-WALK = simulated("demo", 8, SECONDS, "lidar.model=VLP-16", *GOOD_SKY, "stand.trees_per_ha=400",
+WALK = simulated("demo", 8, SECONDS, "lidar.model=VLP-16", *HALF_THE_SCANS, *GOOD_SKY, "stand.trees_per_ha=400",
                  "mag.enabled=true")
 TRUTH = WALK.with_suffix(".truth")
 

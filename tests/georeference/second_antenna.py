@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bad_input"))
-from program import Cases, program, simulated
+from program import HALF_THE_SCANS, Cases, program, simulated
 
 cases = Cases()
 ANTENNAS = ("gnss.mount_m=[0.2,-0.3,0.4]", "gnss.second_antenna_m=[0.1,0.8,0.05]")
@@ -18,7 +18,7 @@ RECEIVER = ("gnss.open_sd_m=1.5", "gnss.canopy_sd_m=1", "gnss.correlation_s=30")
 
 
 def recorded(site, seconds, *settings):
-    return simulated(site, 5, seconds, "lidar.model=VLP-16", *ANTENNAS, *RECEIVER, *settings)
+    return simulated(site, 5, seconds, "lidar.model=VLP-16", *HALF_THE_SCANS, *ANTENNAS, *RECEIVER, *settings)
 
 
 def yaw_of(x, y, z, w):
