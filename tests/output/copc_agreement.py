@@ -37,9 +37,13 @@ def run(*words, codes=(0, 4)):
 
 
 def rows(points, trees=False):
-    """The points, one a row, in an order of their own."""
-    table = np.array([np.nan_to_num(np.asarray(points[name], dtype=float), nan=-1e9) for name in COLUMNS + TREES * trees]).T
-    return table[np.lexsort(table.T[::-1])]
+    """The points, one a row, in the order of a hash of their values: to sort by the columns takes five times as long."""
+    names = COLUMNS + TREES * trees
+    table = np.column_stack([np.nan_to_num(np.asarray(points[name], dtype=float), nan=-1e9) for name in names]) + 0.0
+    odd = np.random.default_rng(1).integers(2**62, 2**63, len(names), dtype=np.uint64) | np.uint64(1)
+    bits = table.view(np.uint64)
+    hashed = ((bits ^ bits >> np.uint64(32)) * odd).sum(axis=1, dtype=np.uint64)  # whole numbers have no low bits
+    return table[np.argsort(hashed, kind="stable")]
 
 
 def nodes_of(path):
