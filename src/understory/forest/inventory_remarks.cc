@@ -24,7 +24,8 @@ std::string density_remark(double near_breast, double per_m2, const StemDetector
         "trees may be missing from the list.",
         near_breast, per_m2, stems.lowest_m, stems.highest_m, 100.0 * result.thin.dense_share);
   return fmt::format(
-      "Only {:.1f} returns per square metre lie between {} and {} m above the ground ({:.0f} of all "
+      "Only {:.1f} returns per square metre lie between {} and {} m above the ground ({:.0f} of "
+      "all "
       "heights): too few to see stems reliably. Trees are missing from the list; the terrain and "
       "canopy models are not affected.",
       near_breast, stems.lowest_m, stems.highest_m, per_m2);
@@ -37,7 +38,8 @@ void remark_on_stems(const StemHarvest& gathered, const InventoryConfig& config,
   const std::uint64_t returns = gathered.near_breast;
   const double near_breast = static_cast<double>(returns) / area_m2;
   const std::size_t by_crown = result.trees.size() - result.stems.size();
-  if (gathered.blur_m > 0.0) remarks.push_back(blur_remark(gathered.blur_m, gathered.range_noise_m));
+  if (gathered.blur_m > 0.0)
+    remarks.push_back(blur_remark(gathered.blur_m, gathered.range_noise_m));
   if (by_crown > 0)
     remarks.push_back(fmt::format(
         "{} trees were found by their crowns alone ({:.1f} returns per square metre lie between {} "
@@ -79,7 +81,7 @@ std::vector<std::string> remarks_on(const StemHarvest& gathered, const Inventory
     no_top += std::isnan(tree.height_m) ? 1 : 0;
   if (no_top > 0) {
     remarks.push_back(fmt::format("{} of {} trees have no height: their tops were not seen.",
-                                         no_top, result.trees.size()));
+                                  no_top, result.trees.size()));
   }
   return remarks;
 }

@@ -64,9 +64,8 @@ std::vector<std::size_t> stems_for_range_noise(const std::vector<StemFit>& stems
   std::vector<std::size_t> best(stems.size());
   std::iota(best.begin(), best.end(), 0U);
   std::erase_if(best, [&](std::size_t i) { return !tells_range_noise(stems[i]); });
-  sort_stably(best, [&](std::size_t a, std::size_t b) {
-    return stems[a].returns > stems[b].returns;
-  });
+  sort_stably(best,
+              [&](std::size_t a, std::size_t b) { return stems[a].returns > stems[b].returns; });
   best.resize(std::min(best.size(), kMostStems));
   return best;
 }

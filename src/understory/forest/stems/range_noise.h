@@ -38,7 +38,7 @@ class StemPoints {
 // A stem fitted with scatter to all sides alone, and with most of it along the beams. Path errors
 // scatter to all sides, and ranges along the beams.
 struct RangeNoiseFits {
-  double noise_m = 0.0;     // along the beams, in the plane; of the second fit
+  double noise_m = 0.0;      // along the beams, in the plane; of the second fit
   double likelier_by = 0.0;  // the second one: mean logarithm of the likelihood over the returns
 };
 // Nothing where one of the fits fails. `points`: around the stem.
