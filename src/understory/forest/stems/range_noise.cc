@@ -86,14 +86,14 @@ std::optional<RangeNoiseFits> fit_range_noise(const std::vector<SlicePoint>& poi
 
 double range_noise_of(const std::vector<RangeNoiseFits>& stems) {
   if (stems.size() < kFewestStems) return 0.0;
-  double likelier = 0.0;
+  std::vector<double> likelier;
   std::vector<double> noises;
   for (const RangeNoiseFits& stem : stems) {
-    likelier += stem.likelier_by / static_cast<double>(stems.size());
+    likelier.push_back(stem.likelier_by);
     noises.push_back(stem.noise_m);
   }
   const double noise = upper_median(std::move(noises));
-  return likelier < kLeastLikelier || noise < kLeastNoise ? 0.0 : noise;
+  return upper_median(std::move(likelier)) < kLeastLikelier || noise < kLeastNoise ? 0.0 : noise;
 }
 
 double fit_reach_m(double range_noise_m) {
