@@ -180,7 +180,8 @@ void judge_density(const StemHarvest& gathered, const std::vector<Eigen::Vector3
   const double canopy_m = canopy_height(result.canopy);
   const bool below = below_canopy(scanner, canopy_m, result);
   result.from_above = few_low && !below;
-  result.open_land = few_low && (below || canopy_m == 0.0) &&
+  // A cut at another height shows no stem, either.
+  result.open_land = few_low && !result.stems.empty() && (below || canopy_m == 0.0) &&
                      result.thin.dense_share >= kDenseShare &&
                      result.thin.near_breast_per_m2 < kSparse;
   if (result.from_above) result.thin = {};  // no stem is looked for there

@@ -267,7 +267,9 @@ class Estimator {
   void add_noisy_point(const FlatPoint& point, Sums& sums, Eigen::ArrayXd& seen) {
     const Eigen::Vector2d q = point.place - centre_ - point.rise * slope_;
     const double r = radius_ + taper_ * point.rise;
-    const auto [begin, near] = row_near(q, r, std::hypot(scatter_, range_noise_));
+    const Row row = row_near(q, r, std::hypot(scatter_, range_noise_));
+    const Eigen::Index begin = row.begin;
+    const Eigen::Index near = row.size;
     using Column = PlaceTable::Column;
     std::array<Places, PlaceTable::kColumns> columns;
     columns.fill(Places::Zero());
