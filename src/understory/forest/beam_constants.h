@@ -12,7 +12,7 @@ inline constexpr double kLeastCosine = 0.08;
 inline constexpr double kLeastPart = 0.1;
 // Share of the excess of the width that the radius of a stem has which was seen from one side. At
 // half a circumference it is half of that. [tuned on maps of `random` by the program's own path,
-// with the next two. Seeds: docs/method/forest-experiments.md, the noise of the ranges]
+// with the next two. Seeds: docs/method/forest-experiments.md, noise along the beams]
 inline constexpr double kOneSided = 0.92;
 // Standard deviations of a beam that the radius grows by from whichever side it was seen
 // [tuned likewise]

@@ -99,7 +99,8 @@ struct InventoryResult {
   std::string two_images;   // why its scans do not lie on each other; empty: nothing says so
   bool too_sparse = false;  // for stems: some are missing from the list
   bool from_above = false;  // too sparse, as hardly any of its points lie near breast height
-  bool open_land = false;   // the same, as hardly anything stands where the cloud is dense
+  bool open_land = false;   // too sparse, as hardly anything stands where the cloud is dense
+  double range_noise_m = 0.0;  // along the beams, see range_noise_of; 0: none, or not known
   std::vector<std::string> remarks;
 };
 

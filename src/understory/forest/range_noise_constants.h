@@ -29,8 +29,7 @@ inline constexpr int kEnoughPoints = 300;
 inline constexpr double kFirstShare = 0.7;
 // Mean logarithm of the likelihood by which noise along the beams must be likelier, the median over
 // the stems. Lidars have such noise, and stems seen from all sides tell less of it than errors of
-// the fit do [tuned: simulated sites up to seed 18 have -0.003 to +0.027 and random 86 -0.004,
-// treels/pine_plot with 2, 3 and 5 cm to all sides -0.011, -0.007 and -0.006]
+// the fit do [tuned: docs/method/forest-experiments.md, noise along the beams]
 inline constexpr double kLeastLikelier = -0.0045;
 // m: less noise changes nothing [bound: a tenth of a millimetre in the diameter]
 inline constexpr double kLeastNoise = 0.003;

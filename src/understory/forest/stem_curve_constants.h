@@ -135,8 +135,6 @@ inline constexpr double kLongestGap = 2.0;
 inline constexpr double kPredictionSd = 0.006;
 // Share of a section's shift that turns the axis [chosen]
 inline constexpr double kSlopeGain = 0.15;
-// m around the predicted surface whose points enter a fit [chosen]
-inline constexpr double kFitReach = 0.1;
 // Share of the points that belong to something else at most [chosen]
 inline constexpr double kMostStrays = 0.45;
 // Times the fit's own error: returns are not independent [as in stem_fit]

@@ -246,6 +246,45 @@ TEST(TiledInventory, ABlurredCloudHasTheSameTreesWhateverTheTilesAre) {
   }
 }
 
+// Stems of 20 to 34 cm that a lidar with noisy ranges saw from two sides each.
+Cloud strip_in_noise(double noise_m) {
+  TestPlot plot(17);
+  Random random(18);
+  plot.add_ground(40.0, 40);
+  for (int k = 0; k < 8; ++k) {
+    const Eigen::Vector2d at(3.0 + 4.7 * k, 8.0 + 6.0 * (k % 3));
+    const double radius = 0.1 + 0.01 * k;
+    for (int i = 0; i < 3'000; ++i) {
+      const double turn = i % 2 == 0 ? 0.3 : 1.2;
+      const Eigen::Vector2d view(std::cos(turn), std::sin(turn));
+      const Eigen::Vector2d across(-view.y(), view.x());
+      const double height = random.uniform(0.1, 4.0);
+      const double r = radius - 0.008 * (height - 1.3);
+      const double off = random.uniform(-r, r);
+      const double depth = -std::sqrt(r * r - off * off) + random.normal(0.0, noise_m);
+      const Eigen::Vector2d point = at + (off + random.normal(0.0, 0.008)) * across + depth * view;
+      plot.cloud.emplace_back(point.x(), point.y(), plot.ground(at.x(), at.y()) + height);
+    }
+  }
+  return plot.cloud;
+}
+
+TEST(TiledInventory, NoiseAlongTheBeamsIsFoundWhateverTheTilesAre) {
+  const Cloud cloud = strip_in_noise(0.03);
+  const InventoryResult whole = take_inventory(blocks_of(cloud), basic_inventory());
+  EXPECT_NEAR(whole.range_noise_m, 0.03, 0.005);
+  ASSERT_EQ(whole.trees.size(), 8U);
+  for (std::size_t k = 0; k < 8; ++k)
+    EXPECT_NEAR(whole.trees[k].dbh_m, 0.2 + 0.02 * static_cast<double>(k), 0.015) << k;
+  for (const double tile_m : {25.0, 20.3}) {
+    SCOPED_TRACE(::testing::Message() << tile_m);
+    const InventoryResult tiled =
+        take_inventory(SortedCloud(cloud, tile_m, false, false), basic_inventory());
+    EXPECT_EQ(tiled.range_noise_m, whole.range_noise_m);
+    expect_same(whole, tiled);
+  }
+}
+
 TEST(TiledInventory, AFullOneHasTheTreesOfABasicOneAndThinnerOnes) {
   const InventoryResult full = take_inventory(blocks_of(strip_of_stems()), {});
   const InventoryResult basic = take_inventory(blocks_of(strip_of_stems()), basic_inventory());

@@ -41,7 +41,7 @@ constexpr const char* kCounts[] = {"trees_in_seen_area",
                                    "stumps",
                                    "logs"};
 constexpr const char* kOtherQuality[] = {"area_m2", "seen_area_m2", "thin_coverage_share",
-                                         "logs_volume_m3"};
+                                         "range_noise_m", "logs_volume_m3"};
 
 std::size_t count_of(const RunJson& json, const std::string& name) {
   const double value = json.find_number("/counts/" + name);

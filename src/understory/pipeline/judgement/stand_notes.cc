@@ -87,6 +87,7 @@ void note_doubts(const InventoryResult& inventory, RunSummary& summary) {
   count("look_again_trees", trees_at(inventory.look_again));
   if (inventory.dead_wood) note_dead_wood(*inventory.dead_wood, summary);
   summary.quality["thin_coverage_share"] = inventory.thin.share;
+  summary.quality["range_noise_m"] = inventory.range_noise_m;
 }
 
 std::string terminal_notes(const InventoryResult& inventory) {

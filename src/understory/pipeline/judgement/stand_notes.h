@@ -19,7 +19,7 @@ struct StandNotes {
 [[nodiscard]] StandNotes notes_on(const InventoryResult& inventory);
 
 // Fills in the notes of a run, its counts diameters_doubtful, heights_missing, trees_by_crown,
-// look_again_places and look_again_trees, and the figure thin_coverage_share.
+// look_again_places and look_again_trees, and the figures thin_coverage_share and range_noise_m.
 void note_doubts(const InventoryResult& inventory, RunSummary& summary);
 
 // The lines of the notes for the terminal, each with its end: doubts and where to look again.
