@@ -10,6 +10,7 @@ hold them that are not the program's list:
 """
 
 import csv
+import json
 import os
 import subprocess
 import sys
@@ -150,7 +151,7 @@ def check_halves(cloud, folder):
 
 
 def blurred(cloud, folder):
-    """Trees of a cloud with 4 cm of noise added. The report has to say that it is blurred."""
+    """Trees of a cloud with 4 cm of noise added. The report has to say so first of all."""
     points = np.array(laspy.read(cloud).xyz)
     header = laspy.LasHeader(point_format=0, version="1.2")
     header.scales, header.offsets = [0.001] * 3, np.floor(points.min(axis=0))
@@ -158,7 +159,8 @@ def blurred(cloud, folder):
     noisy.xyz = points + np.random.default_rng(4).normal(0.0, 0.04, points.shape)
     noisy.write(str(folder / f"noisy_{cloud.stem}.laz"))
     trees = inventory(folder / f"noisy_{cloud.stem}.laz", folder)
-    assert "The cloud is blurred" in (folder / f"run_noisy_{cloud.stem}" / "run.json").read_text(encoding="utf-8")
+    run = json.loads((folder / f"run_noisy_{cloud.stem}" / "run.json").read_text(encoding="utf-8"))
+    assert run["notes"][0].startswith("the cloud is blurred: "), run["notes"]
     return trees
 
 

@@ -389,6 +389,7 @@ InventoryResult take_inventory(const TiledCloud& cloud, const InventoryConfig& c
   result.slices = std::move(gathered.slices);
   result.stems = std::move(gathered.stems);
   result.range_noise_m = gathered.range_noise_m;
+  result.blur_m = gathered.blur_m;
   drop_low_ends(SlicesNear(result.slices, gathered.thinned, cloud, result.origin), config.stems,
                 lookouts, result);
   take_section_radii(result);

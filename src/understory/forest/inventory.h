@@ -101,6 +101,7 @@ struct InventoryResult {
   bool from_above = false;  // too sparse, as hardly any of its points lie near breast height
   bool open_land = false;   // too sparse, as hardly anything stands where the cloud is dense
   double range_noise_m = 0.0;  // along the beams, see range_noise_of; 0: none, or not known
+  double blur_m = 0.0;         // of the cloud about its stems, see add_blurred_stems; 0: sharp
   std::vector<std::string> remarks;
 };
 

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "understory/forest/forest_constants.h"
-#include "understory/forest/stems/blurred_stems.h"
 
 namespace understory {
 namespace {
@@ -38,8 +37,6 @@ void remark_on_stems(const StemHarvest& gathered, const InventoryConfig& config,
   const std::uint64_t returns = gathered.near_breast;
   const double near_breast = static_cast<double>(returns) / area_m2;
   const std::size_t by_crown = result.trees.size() - result.stems.size();
-  if (gathered.blur_m > 0.0)
-    remarks.push_back(blur_remark(gathered.blur_m, gathered.range_noise_m));
   if (by_crown > 0)
     remarks.push_back(fmt::format(
         "{} trees were found by their crowns alone ({:.1f} returns per square metre lie between {} "

@@ -61,16 +61,15 @@ void take_blurred(std::vector<StemFit> blurred, BlurredRole role, std::vector<St
   sort_by_place(stems);
 }
 
-std::string blur_remark(double blur_m, double range_noise_m) {
+std::string blur_note(double blur_m, double range_noise_m) {
   const std::string cause =
       range_noise_m > 0.0
-          ? fmt::format("Most of it lies along the beams: the ranges have {:.1f} cm of noise.",
+          ? fmt::format("Most of it lies along the beams: the ranges have {:.1f} cm of noise",
                         100.0 * range_noise_m)
-          : std::string("It goes to all sides: the path has errors, or the cloud was processed.");
+          : std::string("It goes to all sides: the path has errors, or the cloud was processed");
   return fmt::format(
-      "The cloud is blurred: points scatter by {:.0f} cm about the stems (median). {} Stems "
-      "thinner "
-      "than {:.0f} cm may be missing, or far too thick.",
+      "the cloud is blurred: points scatter by {:.0f} cm about the stems (median). {}. Stems "
+      "thinner than {:.0f} cm may be missing, or far too thick",
       100.0 * blur_m, cause, 100.0 * 2.0 * kLeastRadiusBlurs * blur_m);
 }
 

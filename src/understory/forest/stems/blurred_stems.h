@@ -35,6 +35,6 @@ double add_blurred_stems(const StemDetectorConfig& config, const CutSearch& sear
 
 // What a user has to know of a blurred cloud, in a few sentences. `blur_m`: as of blur_of;
 // `range_noise_m`: as of range_noise_of.
-[[nodiscard]] std::string blur_remark(double blur_m, double range_noise_m);
+[[nodiscard]] std::string blur_note(double blur_m, double range_noise_m);
 
 }  // namespace understory

@@ -147,9 +147,9 @@ TEST(BlurredStems, ThatAreFoundTellMoreBlurInASecondRound) {
   EXPECT_EQ(blurs, (std::vector<double>{0.03, 0.05, 0.05, 0.05}));
 }
 
-TEST(BlurredStems, TheRemarkTellsWhereTheScatterLies) {
-  EXPECT_NE(blur_remark(0.03, 0.034).find("the ranges have 3.4 cm of noise"), std::string::npos);
-  EXPECT_NE(blur_remark(0.03, 0.0).find("the path has errors"), std::string::npos);
+TEST(BlurredStems, TheNoteTellsWhereTheScatterLies) {
+  EXPECT_NE(blur_note(0.03, 0.034).find("the ranges have 3.4 cm of noise"), std::string::npos);
+  EXPECT_NE(blur_note(0.03, 0.0).find("the path has errors"), std::string::npos);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "understory/forest/stems/blurred_stems.h"
 #include "understory/forest/trees/tree_doubt.h"
 #include "understory/pipeline/pipeline_constants.h"
 
@@ -58,6 +59,7 @@ StandNotes notes_on(const InventoryResult& inventory) {
   StandNotes notes;
   const StandDoubts doubts = doubts_of(inventory.trees);
   notes.doubts = doubts_text(doubts);
+  if (inventory.blur_m > 0.0) notes.blur = blur_note(inventory.blur_m, inventory.range_noise_m);
   if (const std::vector<LookAgain>& places = inventory.look_again; !places.empty())
     notes.look_again = fmt::format(
         "walk here: {} {} would show {} of the {} doubtful stems from an unseen side, or from "
@@ -74,7 +76,7 @@ StandNotes notes_on(const InventoryResult& inventory) {
 
 void note_doubts(const InventoryResult& inventory, RunSummary& summary) {
   const StandNotes notes = notes_on(inventory);
-  for (const std::string& note : {notes.doubts, notes.look_again, notes.thin})
+  for (const std::string& note : {notes.blur, notes.doubts, notes.look_again, notes.thin})
     if (!note.empty()) summary.notes.push_back(note);
   const StandDoubts doubts = doubts_of(inventory.trees);
   const auto count = [&](const char* name, std::size_t value) {
@@ -93,7 +95,7 @@ void note_doubts(const InventoryResult& inventory, RunSummary& summary) {
 std::string terminal_notes(const InventoryResult& inventory) {
   const StandNotes notes = notes_on(inventory);
   std::string text;
-  for (const std::string& note : {notes.doubts, notes.look_again})
+  for (const std::string& note : {notes.blur, notes.doubts, notes.look_again})
     if (!note.empty()) text += note + "\n";
   return text;
 }

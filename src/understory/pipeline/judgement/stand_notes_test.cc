@@ -41,6 +41,18 @@ TEST(StandNotes, DoubtfulTreesAreCountedAndTheVerdictStays) {
   EXPECT_EQ(terminal_notes(inventory), summary.notes[0] + "\n" + summary.notes[1] + "\n");
 }
 
+// Bug: the report of a cloud with 3 cm of noise had this far below its verdict "Complete".
+TEST(StandNotes, ABlurredCloudIsToldFirst) {
+  InventoryResult inventory;
+  inventory.trees = {tree_with(1, 0.2, 0.07, 12.0)};
+  inventory.blur_m = 0.04;
+  RunSummary summary;
+  note_doubts(inventory, summary);
+  ASSERT_EQ(summary.notes.size(), 2U);
+  EXPECT_EQ(summary.notes[0].rfind("the cloud is blurred: points scatter by 4 cm", 0), 0U);
+  EXPECT_EQ(terminal_notes(inventory), summary.notes[0] + "\n" + summary.notes[1] + "\n");
+}
+
 TEST(StandNotes, NothingInDoubtGivesNoNote) {
   InventoryResult inventory;
   inventory.trees = {tree_with(1, 0.2, 0.01, 12.0)};
