@@ -149,15 +149,16 @@ function(understory_test target)
                        PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
 endfunction()
 
-# understory_python_test(<name> SCRIPT <file> [NEEDS <module>...] [ARGUMENTS ...] [TIMEOUT <seconds>]
+# understory_python_test(<name> [IN_TURNS] SCRIPT <file> [NEEDS <module>...] [ARGUMENTS ...] [TIMEOUT <seconds>]
 #                        [PACKAGES <file>])
 # A Python script, run in the environment of tools/python-env.sh; exit status 0 is a pass. It skips
 # when a module of NEEDS cannot be imported. The script finds the program in UNDERSTORY_PROGRAM and
 # the example data in UNDERSTORY_DATA, and may itself skip with exit status 77. With PACKAGES it runs
 # in an environment of its own, of that list of packages (below the top folder). Those with the longest limits start
-# first: a long test that starts last would leave processors idle.
+# first: a long test that starts last would leave processors idle. IN_TURNS: for a test of over 20 s that tries many
+# variants; `./run test` runs a third of these with each commit (tools/tests-in-turns.sh).
 function(understory_python_test name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "SCRIPT;TIMEOUT;PACKAGES" "NEEDS;ARGUMENTS")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "IN_TURNS" "SCRIPT;TIMEOUT;PACKAGES" "NEEDS;ARGUMENTS")
   if(NOT UNDERSTORY_TESTS)
     return()
   endif()
@@ -171,6 +172,9 @@ function(understory_python_test name)
   set_tests_properties(python.${name} PROPERTIES
     SKIP_RETURN_CODE 77 TIMEOUT ${arg_TIMEOUT} COST ${arg_TIMEOUT}
     ENVIRONMENT "UNDERSTORY_PROGRAM=${PROJECT_BINARY_DIR}/understory;UNDERSTORY_BUILD=${PROJECT_BINARY_DIR};UNDERSTORY_PACKAGES=${arg_PACKAGES}")
+  if(arg_IN_TURNS)
+    set_tests_properties(python.${name} PROPERTIES LABELS in_turns)
+  endif()
 endfunction()
 
 # understory_program(<target> SOURCES ... [LAYERS ...] [LIBRARIES ...])

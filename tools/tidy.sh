@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# tidy.sh [BASE|all]: clang-tidy on the .cc files (tests apart) that differ from the commit BASE, or on
-# every one. The default is where this branch left main; on main the last commit.
+# tidy.sh [--seconds S] [BASE|all]: clang-tidy on the .cc files (tests apart) that differ from the commit BASE, or on
+# every one. The default is where this branch left main; on main the last commit. Those that changed most come first.
+# With --seconds no file is begun after that time, and how many are left is said.
 # A file that passed before is passed over: the cache holds the hash of each that did, taken over
 # its preprocessed text and the configuration.
 set -euo pipefail
@@ -38,13 +39,22 @@ EOF
 }
 
 if [[ ${1:-} == --file ]]; then
+  if [[ -n ${UNDERSTORY_TIDY_END:-} ]] && (($(date +%s) >= UNDERSTORY_TIDY_END)); then
+    echo "$2" >>build-tidy/left
+    exit
+  fi
   tidy_file "$2"
   exit
+fi
+if [[ ${1:-} == --seconds ]]; then
+  export UNDERSTORY_TIDY_END=$(($(date +%s) + $2))
+  shift 2
 fi
 if [[ ${1:-} == all ]]; then
   mapfile -t files < <(git ls-files -- 'src/*.cc' ':!*_test.cc')
 else
-  mapfile -t files < <(git diff --name-only --diff-filter=d "${1:-$(default_base)}" -- 'src/*.cc' ':!*_test.cc')
+  mapfile -t files < <(git diff --numstat --diff-filter=d "${1:-$(default_base)}" -- 'src/*.cc' ':!*_test.cc' |
+    sort -k1,1nr -k3 | cut -f3)
 fi
 if ((${#files[@]} == 0)); then
   say "no changed files"
@@ -52,4 +62,8 @@ if ((${#files[@]} == 0)); then
 fi
 mkdir -p build-tidy "$cache/tidy"
 cmake --preset tidy >build-tidy/configure.log 2>&1 || { tail -n 20 build-tidy/configure.log >&2; exit 1; }
-printf '%s\0' "${files[@]}" | xargs -0 -r -n 1 -P "$(nproc)" "$0" --file
+rm -f build-tidy/left
+code=0
+printf '%s\0' "${files[@]}" | xargs -0 -r -n 1 -P "$(nproc)" "$0" --file || code=1
+if [[ -s build-tidy/left ]]; then say "$(wc -l <build-tidy/left) of ${#files[@]} files were not looked at for want of time"; fi
+exit "$code"
