@@ -27,10 +27,8 @@ lenient_arguments() {
   [[ $("${CXX:-c++}" -dumpversion 2>/dev/null) == 12* ]] || echo -DUNDERSTORY_WARNINGS_AS_ERRORS=OFF
 }
 
-# build_preset PRESET [TARGET...]
-build_preset() {
-  local preset=$1 folder target_arguments=() log
-  shift
+configure_preset() { # preset
+  local preset=$1 folder log
   folder=$(preset_folder "$preset")
   mkdir -p "$folder"
   log=$folder/configure.log
@@ -39,8 +37,22 @@ build_preset() {
     tail -n 40 "$log" >&2
     fail "configuring preset $preset failed; the whole log is $log"
   fi
+}
+
+# build_preset PRESET [TARGET...]
+build_preset() {
+  local preset=$1 target_arguments=()
+  shift
+  configure_preset "$preset"
   if (($#)); then target_arguments=(--target "$@"); fi
-  cmake --build "$folder" --parallel "$(jobs_that_fit)" "${target_arguments[@]}"
+  cmake --build "$(preset_folder "$preset")" --parallel "$(jobs_that_fit)" "${target_arguments[@]}"
+}
+
+# commit_number BELOW: a number from 0 to BELOW - 1 that the hash of the present commit chooses.
+commit_number() {
+  local hash
+  hash=$(git -C "$top" rev-parse --verify --quiet HEAD || echo 0)
+  echo $((16#${hash:0:7} % $1))
 }
 
 preset_folder() {

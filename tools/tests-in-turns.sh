@@ -1,13 +1,12 @@
 #!/usr/bin/env bash
-# tests-in-turns.sh [COMMIT]
-# Prints a regular expression of the tests that `./run test` leaves out with this commit (default HEAD). Those that are
+# tests-in-turns.sh
+# Prints a regular expression of the tests that `./run test` leaves out with this commit. Those that are
 # marked IN_TURNS take most of the time; a third of them runs with each commit. The hash of the commit says which.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 cd "$top"
 thirds=3
-hash=$(git rev-parse --verify --quiet "${1:-HEAD}" || echo 0)
-turn=$((16#${hash:0:7} % thirds))
+turn=$(commit_number $thirds)
 listed=$(ctest --test-dir build -N -L in_turns)
 mapfile -t names < <(awk '/Test +#/ {print $NF}' <<<"$listed" | sort)
 ((${#names[@]} >= thirds)) || fail "fewer than $thirds tests are marked IN_TURNS"
