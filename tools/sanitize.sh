@@ -30,7 +30,7 @@ long_tests() { grep -v '^#' tools/long_tests.txt; }
 
 # The layers that have tests, in the order in which --seconds takes them.
 layers_in_turn() {
-  local readers="util recording output" others=() path turn
+  local readers="util recording" others=() path turn
   for path in src/understory/*/CMakeLists.txt; do
     path=$(basename "$(dirname "$path")")
     if [[ " $readers " != *" $path "* && -n $(find "src/understory/$path" -name '*_test.cc' -print -quit) ]]; then

@@ -356,6 +356,11 @@ inline constexpr double kBinScatters = 0.8;
 // The same where noise lies along the beams [bound: a sum of Gaussians so far apart is even to
 // 1e-5]
 inline constexpr double kNoisyBinScatters = 1.3;
+// Share by which the variance of the scatter is smaller along the beams, where these have noise
+// [fitted: maps by one ray a beam, to 15 m]
+inline constexpr double kLessAlong = 0.4;
+// Of the variance of the noise, the share that is beside the scatter at least [bound: division]
+inline constexpr double kLeastShareAlong = 0.1;
 // m: noise along the beams that a fit finds, at least [bound: rounding]
 inline constexpr double kLeastRangeNoise = 0.001;
 // m: the same at most [bound: scanners]

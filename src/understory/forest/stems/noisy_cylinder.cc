@@ -29,9 +29,10 @@ class PlaceTable {
   static constexpr int kColumns = 6;  // that are summed up
 
   // `lobes`: what each direction (column) sees of each place (row). `views`: how much of all comes
-  // from it. The standard deviations are metres, to all sides and along the beams.
+  // from it. `scatter`: standard deviation to all sides, metres. `along`: variance that is added
+  // along the beams, square metres.
   void fill(const Eigen::MatrixXd& lobes, const Eigen::VectorXd& views, double scatter,
-            double range_noise) {
+            double along) {
     const Eigen::Index count = lobes.rows();
     const Eigen::Index directions = lobes.cols();
     Eigen::MatrixXd moments(directions, 4);
@@ -45,10 +46,10 @@ class PlaceTable {
     for (Eigen::Index b = 0; b < count; ++b) {
       const double turn = 2.0 * M_PI * (static_cast<double>(b) + 0.5) / static_cast<double>(count);
       const Eigen::Vector2d outward(std::cos(turn), std::sin(turn));
-      const double noise = range_noise * range_noise / seen(b, 3);
       Eigen::Matrix2d covariance;
       covariance << seen(b, 0), seen(b, 1), seen(b, 1), seen(b, 2);
-      covariance = noise * covariance + scatter * scatter * Eigen::Matrix2d::Identity();
+      covariance = along / seen(b, 3) * covariance;
+      covariance += scatter * scatter * Eigen::Matrix2d::Identity();
       const Eigen::Matrix2d precision = covariance.inverse();
       const Eigen::Vector2d out = precision * outward;
       values_.row(b) << precision(0, 0), precision(0, 1), precision(1, 1), out.x(), out.y(),
@@ -185,7 +186,7 @@ class Estimator {
     Vector6 right = Vector6::Zero();
     double weight = 0.0;
     double square = 0.0;
-    double along = 0.0;  // slope of the log likelihood over the noise's variance, twice
+    double along = 0.0;  // slope of the log likelihood over the variance of the noise, twice
     double log_likelihood = 0.0;
   };
 
@@ -301,12 +302,13 @@ class Estimator {
     };
     sums.log_likelihood += point.weight * std::log(all);
     sums.weight += w * density;
-    // What of a displacement is scatter, and how the likelihood grows with the noise.
+    // How the likelihood grows with the variance to all sides and with that along the beams; and
+    // what of a displacement is scatter.
     const double s2 = scatter_ * scatter_;
-    const double square = w * squares.sum();
-    const double trace = sum(Column::kXx) + sum(Column::kYy);
-    sums.square += s2 * s2 * square + 2.0 * s2 * w * density - s2 * s2 * trace;
-    sums.along += w * distances.sum() - s2 * square - 2.0 * w * density + s2 * trace;
+    const double to_all_sides = w * squares.sum() - sum(Column::kXx) - sum(Column::kYy);
+    const double along = (w * distances.sum() - 2.0 * w * density - s2 * to_all_sides) / along_;
+    sums.along += along;
+    sums.square += 2.0 * s2 * w * density + s2 * s2 * (to_all_sides - kLessAlong * along);
     seen.segment(begin, near) += w * shares_.head(near);
     Eigen::Matrix2d precision;
     precision << sum(Column::kXx), sum(Column::kXy), sum(Column::kXy), sum(Column::kYy);
@@ -342,16 +344,26 @@ class Estimator {
   void learn_range_noise(const Sums& sums) {
     const double variance = range_noise_ * range_noise_;
     const double whole = scatter_ * scatter_ + variance;
-    const double step = whole * whole * sums.along / (variance * sums.weight);
+    const double step = whole * whole * sums.along / sums.weight;
     range_noise_ =
         std::clamp(std::sqrt(std::max(0.0, variance + step)), kLeastRangeNoise, kMostRangeNoise);
+  }
+
+  // The scatter is smaller along the beams. The width of a beam and an error of heading shift a
+  // point sideways, and hardly change its range. So part of the noise lies within the scatter.
+  [[nodiscard]] double variance_along() const {
+    const double noise = range_noise_ * range_noise_;
+    return std::max(kLeastShareAlong * noise, noise - kLessAlong * scatter_ * scatter_);
   }
 
   bool step(NoisyCylinder& result) {
     Sums sums;
     Eigen::ArrayXd seen = Eigen::ArrayXd::Zero(visible_.size());
     const bool noisy = range_noise_ > 0.0;
-    if (noisy) table_.fill(lobes_, views_, scatter_, range_noise_);
+    if (noisy) {
+      along_ = variance_along();
+      table_.fill(lobes_, views_, scatter_, along_);
+    }
     for (const FlatPoint& point : flat_)
       noisy ? add_noisy_point(point, sums, seen) : add_point(point, sums, seen);
     if (sums.weight < std::min(kLeastWeight, 1.0 - config_.most_strays) * total_) return false;
@@ -410,6 +422,7 @@ class Estimator {
   double taper_ = 0.0;
   double scatter_ = 0.0;
   double range_noise_ = 0.0;  // 0: none beside the scatter
+  double along_ = 0.0;        // variance that is added to the scatter along the beams
   PlaceTable table_;          // where there is some
   double strays_ = kFirstStrays;
   double stray_density_ = 1.0;

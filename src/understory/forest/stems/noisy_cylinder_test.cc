@@ -85,6 +85,34 @@ TEST(NoisyCylinder, NoiseOfRangesThatIsKnownDoesNotMakeTheStemThinner) {
   EXPECT_LT(unknown, 0.105);
 }
 
+// Wide beams and errors of heading shift points sideways more than along the beams.
+TEST(NoisyCylinder, ScatterToTheSideIsFoundBesideTheNoiseOfRanges) {
+  Random random(7);
+  constexpr double kScatter = 0.018;
+  constexpr double kNoise = 0.012;
+  const double along = std::hypot(kNoise, std::sqrt(0.6) * kScatter);
+  double radius = 0.0;
+  double scatter = 0.0;
+  constexpr int kStems = 100;
+  for (int i = 0; i < kStems; ++i) {
+    std::vector<SlicePoint> points = seen_from_one_side(0.12, 0.0, 400, random);
+    for (SlicePoint& point : points) {
+      point.x += static_cast<float>(random.normal(0.0, kScatter));
+      point.y += static_cast<float>(random.normal(0.0, along));
+    }
+    NoisyCylinderConfig config;
+    config.range_noise_m = kNoise;
+    const NoisyCylinder fit = fit_noisy_cylinder(points, start_at(0.12, 0.0, 0.0), config);
+    ASSERT_TRUE(fit.converged);
+    radius += fit.radius_m / kStems;
+    scatter += fit.scatter_m / kStems;
+  }
+  // As much to all sides would fit with 1.5 cm.
+  EXPECT_NEAR(scatter, kScatter, 0.0015);
+  // From one side it is a sixth of the scatter too thin: neighbouring directions share the view.
+  EXPECT_NEAR(radius, 0.12, 0.004);
+}
+
 TEST(NoisyCylinder, NoiseOfRangesIsFound) {
   Random random(6);
   for (const double noise : {0.0, 0.012, 0.03, 0.05}) {
